@@ -1,0 +1,1 @@
+"""Everything between the loop and the metal: drivers, wire protocols, the plant server."""

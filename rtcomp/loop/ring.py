@@ -1,0 +1,101 @@
+"""The ring in shared memory: how the loop hands each tick over to other processes without ever waiting.
+
+One writer, any number of readers, one row of float64 a tick. Layout: a header of eight int64, then
+`capacity` rows of `width` float64. The writer fills the row, then counts it; it never looks at readers
+except at the recorder's mark, to count rows that the recorder had no chance to take.
+The memory is anonymous (no name that could leak or be squatted) and is inherited as a file descriptor.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import tempfile
+
+import numpy as np
+
+from rtcomp.kernels import Floats, compiled
+
+MAGIC, CAPACITY, WIDTH, WRITTEN, TAKEN, CLOSED, LOST, SPARE = range(8)
+"""Places in the header: magic, rows, columns, rows ever written, rows the recorder has taken, writer has
+closed (0 running, 1 complete, 2 ended by an error), rows overwritten before they were taken, not used."""
+
+_MAGIC = 0x72746370  # "rtcp"
+_HEADER_BYTES = 64
+
+
+class Ring:
+    """A ring of rows in shared memory; create it in the loop's process, attach to it elsewhere."""
+
+    def __init__(self, descriptor: int, memory: mmap.mmap, capacity: int, width: int) -> None:
+        self.descriptor = descriptor
+        self._memory = memory
+        self.header: np.ndarray = np.frombuffer(memory, dtype=np.int64, count=8)
+        self.rows: Floats = np.frombuffer(memory, dtype=np.float64, offset=_HEADER_BYTES).reshape(capacity, width)
+
+    @classmethod
+    def create(cls, capacity: int, width: int) -> Ring:
+        """Make a ring of `capacity` rows of `width` float64, all pages touched before use."""
+        size = _HEADER_BYTES + 8 * capacity * width
+        if hasattr(os, "memfd_create"):
+            descriptor = os.memfd_create("rtcomp-ring")
+        else:
+            handle, path = tempfile.mkstemp(prefix="rtcomp-ring-")
+            os.unlink(path)
+            descriptor = handle
+        os.ftruncate(descriptor, size)
+        ring = cls(descriptor, mmap.mmap(descriptor, size), capacity, width)
+        ring.rows[:] = 0.0
+        ring.header[:] = (_MAGIC, capacity, width, 0, 0, 0, 0, 0)
+        return ring
+
+    @classmethod
+    def attach(cls, descriptor: int) -> Ring:
+        """Open the ring behind an inherited file descriptor."""
+        memory = mmap.mmap(descriptor, os.fstat(descriptor).st_size)
+        header = np.frombuffer(memory, dtype=np.int64, count=8)
+        if int(header[MAGIC]) != _MAGIC:
+            raise ValueError("the inherited descriptor is not a ring")
+        return cls(descriptor, memory, int(header[CAPACITY]), int(header[WIDTH]))
+
+    @property
+    def written(self) -> int:
+        """Rows written since the start."""
+        return int(self.header[WRITTEN])
+
+    @property
+    def waiting(self) -> int:
+        """Rows that the recorder has not taken yet."""
+        return int(self.header[WRITTEN] - self.header[TAKEN])
+
+    def take(self, most: int = 1 << 62) -> Floats:
+        """Take the rows that wait, oldest first, as a copy of shape (rows, width). For the one recorder.
+
+        Rows overwritten before they could be taken are skipped and counted in the header's LOST.
+        """
+        capacity = int(self.header[CAPACITY])
+        while True:
+            written, taken = int(self.header[WRITTEN]), int(self.header[TAKEN])
+            if written - taken > capacity:
+                self.header[LOST] += written - capacity - taken
+                taken = written - capacity
+            end = min(written, taken + most)
+            rows = self.rows[np.arange(taken, end) % capacity]
+            if int(self.header[WRITTEN]) - taken < capacity or end == taken:  # not overrun while copying
+                self.header[TAKEN] = end
+                return rows
+            self.header[LOST] += end - taken
+            self.header[TAKEN] = end
+
+    def close(self, ended: int = 1) -> None:
+        """Tell readers that no more rows will come; `ended` is 1 for complete, 2 for ended by an error."""
+        self.header[CLOSED] = ended
+
+
+@compiled
+def push(header: np.ndarray, rows: Floats, row: Floats) -> None:
+    """Write one row: data first, then the count, so that a reader never sees a half-written row as done."""
+    place = header[WRITTEN] % rows.shape[0]
+    for i in range(row.size):
+        rows[place, i] = row[i]
+    header[WRITTEN] += 1

@@ -1,0 +1,133 @@
+"""What an effect is.
+
+An effect is one piece of physics, written once: its place in the chain, its parameters with units and
+bounds, its kernel, where it comes from and how it is seen best. Simulation, force balance, feedforward
+and diagnosis all read this entry. To add one, write a class like those in this folder and register it.
+
+The chain, run for every integration step, in this order::
+
+    drive        volts -> DRIVE force            (reads VOLTS, changes VOLTS, DRIVE, GAIN)
+    disturbance  forces from outside             (adds to PUSH)
+    mechanics    springs, weight, contact, mass  (adds to PUSH, changes MASS)
+    friction     modifiers (change REACH, SCALE), then models and speed laws (add to FRICTION)
+    sensor       true to measured position       (changes SENSED; once a tick, not a step)
+
+Within a place, effects run by `order`, lowest first.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats, Kernel
+
+
+class Place(enum.IntEnum):
+    """Where in the chain an effect acts; the value is the order of evaluation."""
+
+    DRIVE = 0
+    DISTURBANCE = 1
+    MECHANICS = 2
+    FRICTION = 3
+    SENSOR = 4
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect: its name, unit, the range in which it makes sense, and what it is."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    says: str
+    default: float | None = None
+    open_low: bool = False
+    """True where `low` itself is not allowed (a period of zero, say)."""
+
+    def check(self, value: Any, owner: str) -> float:
+        """Return `value` as a float, or raise ConfigError naming the parameter, the value and the range."""
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ConfigError(f"{owner}: {self.name} is {value!r}; it must be a number ({self.unit})")
+        number = float(value)
+        inside = self.low < number <= self.high if self.open_low else self.low <= number <= self.high
+        if not np.isfinite(number) or not inside:
+            bracket = "(" if self.open_low else "["
+            raise ConfigError(
+                f"{owner}: {self.name} is {number:g} {self.unit}; allowed is {bracket}{self.low:g}, {self.high:g}]"
+            )
+        return number
+
+
+class Effect:
+    """Base of every catalogue entry. Subclasses set the class attributes; most need no methods."""
+
+    name: ClassVar[str]
+    """The name in stage files, diagnoses and reports."""
+    place: ClassVar[Place]
+    parameters: ClassVar[Sequence[Parameter]]
+    kernel: ClassVar[Kernel]
+    """``kernel(p, s, w)`` with `p` from `vector()`, `s` from `initial_state()` and `w` the wires."""
+    says: ClassVar[str]
+    """What it is, one sentence."""
+    equation: ClassVar[str]
+    source: ClassVar[str]
+    signature: ClassVar[str]
+    """How it looks in a recording."""
+    experiment: ClassVar[str]
+    """The motion that shows it best."""
+    order: ClassVar[int] = 50
+    states: ClassVar[int] = 0
+    """Length of the kernel's own state."""
+
+    def __init__(self, **values: float) -> None:
+        known = {p.name for p in self.parameters}
+        for key in values:
+            if key not in known:
+                raise ConfigError(f"{self.name}: unknown parameter {key!r}; it has {', '.join(sorted(known))}")
+        self.values: dict[str, float] = {}
+        for parameter in self.parameters:
+            value = values.get(parameter.name, parameter.default)
+            if value is None:
+                raise ConfigError(f"{self.name}: parameter {parameter.name!r} ({parameter.unit}) is missing")
+            self.values[parameter.name] = parameter.check(value, self.name)
+
+    def vector(self) -> Floats:
+        """Return the parameters as the kernel's `p`."""
+        return np.array([self.values[p.name] for p in self.parameters], dtype=np.float64)
+
+    def initial_state(self) -> Floats:
+        """Return the kernel's state at rest in the virgin state."""
+        return np.zeros(self.states)
+
+    def stiffness(self) -> float:
+        """Largest stiffness (N/m) it can put on the mass; bounds the integration step."""
+        return 0.0
+
+    def damping(self) -> float:
+        """Largest damping (N s/m) it can put on the mass; bounds the integration step."""
+        return 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the entry as a stage file's ``effects`` lists it."""
+        return {"name": self.name, **self.values}
+
+    @classmethod
+    def from_dict(cls, entry: Mapping[str, Any]) -> Effect:
+        """Build the effect from a stage file's entry (without its name)."""
+        return cls(**entry)
+
+    def __repr__(self) -> str:
+        inner = ", ".join(f"{k}={v:g}" for k, v in self.values.items())
+        return f"{type(self).__name__}({inner})"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Effect) and self.to_dict() == other.to_dict()
+
+    __hash__ = None  # type: ignore[assignment]

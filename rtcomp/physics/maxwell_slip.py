@@ -1,0 +1,86 @@
+"""Maxwell-slip friction: a bank of stop elements in parallel. Rate-independent, with non-local memory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats, effect_kernel
+from rtcomp.physics.catalogue import register
+from rtcomp.physics.effect import Effect, Parameter, Place
+from rtcomp.physics.wires import FRICTION, MOVED, REACH, SCALE
+
+STIFFNESS = Parameter("stiffness", "N/m", -1e12, 1e12, "spring of the element")
+REACH_M = Parameter("reach", "m", 0.0, 1e3, "travel at which the element yields", open_low=True)
+
+
+@effect_kernel
+def maxwell_slip(p: Floats, s: Floats, w: Floats) -> None:
+    """p: count, then stiffness and reach of each element; s: deflection (m) of each element."""
+    force = 0.0
+    for i in range(int(p[0])):
+        reach = p[2 + 2 * i] * w[REACH]
+        deflection = s[i] + w[MOVED]  # exact over a displacement, however large
+        deflection = min(max(deflection, -reach), reach)
+        s[i] = deflection
+        force += p[1 + 2 * i] * deflection
+    w[FRICTION] += force * w[SCALE]
+
+
+@register
+class MaxwellSlip(Effect):
+    """Stop elements in parallel; `elements` is a list of (stiffness N/m, reach m)."""
+
+    name = "maxwell-slip"
+    place = Place.FRICTION
+    parameters = (STIFFNESS, REACH_M)
+    kernel = maxwell_slip
+    says = "presliding hysteresis of parallel spring and slider elements; a yielded element pushes stiffness * reach"
+    equation = "F = sum k_i z_i,  z_i <- clip(z_i + dx, -r_i, r_i)"
+    source = "Iwan (1966), J. Applied Mechanics 33(4); Lampaert, Swevers, Al-Bender (2002), IEEE TAC 47(4)"
+    signature = "closed hysteresis loops of force against position whose branches are the virgin curve doubled"
+    experiment = "nested reversals of decreasing size inside the presliding range"
+
+    def __init__(self, elements: Sequence[tuple[float, float]]) -> None:
+        if not elements:
+            raise ConfigError("friction is empty; give at least one element {stiffness, reach}")
+        self.elements = [
+            (STIFFNESS.check(k, f"friction[{i}]"), REACH_M.check(r, f"friction[{i}]"))
+            for i, (k, r) in enumerate(elements)
+        ]
+        self.values = {}
+
+    def vector(self) -> Floats:
+        """Return count, then stiffness and reach of each element."""
+        return np.concatenate([[float(len(self.elements))], np.ravel(self.elements)])
+
+    def initial_state(self) -> Floats:
+        """Return the elements' deflections, all relaxed."""
+        return np.zeros(len(self.elements))
+
+    def stiffness(self) -> float:
+        """Return the stiffness with every element sticking (N/m)."""
+        return float(sum(abs(k) for k, _ in self.elements))
+
+    @property
+    def level(self) -> float:
+        """Force with every element yielded (N)."""
+        return float(sum(k * r for k, r in self.elements))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the bank in long form; a stage file writes the plain list of elements."""
+        return {"name": self.name, "elements": [{"stiffness": k, "reach": r} for k, r in self.elements]}
+
+    @classmethod
+    def from_dict(cls, entry: Mapping[str, Any]) -> MaxwellSlip:
+        """Build from ``{elements: [{stiffness, reach}, ...]}``."""
+        unknown = set(entry) - {"elements"}
+        if unknown or "elements" not in entry:
+            raise ConfigError(f"maxwell-slip takes 'elements'; found {sorted(entry)}")
+        return cls([(e["stiffness"], e["reach"]) for e in entry["elements"]])
+
+    def __repr__(self) -> str:
+        return f"MaxwellSlip({len(self.elements)} elements, level {self.level:g} N)"
