@@ -4,6 +4,7 @@ One writer, any number of readers, one row of float64 a tick. Layout: a header o
 `capacity` rows of `width` float64. The writer fills the row, then counts it; it never looks at readers
 except at the recorder's mark, to count rows that the recorder had no chance to take.
 The memory is anonymous (no name that could leak or be squatted) and is inherited as a file descriptor.
+The compiled writer is `rtcomp.loop.push`: readers in other processes need not load a compiler.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ import os
 import tempfile
 
 import numpy as np
+import numpy.typing as npt
 
-from rtcomp.kernels import Floats, compiled
+Floats = npt.NDArray[np.float64]
 
 MAGIC, CAPACITY, WIDTH, WRITTEN, TAKEN, CLOSED, LOST, SPARE = range(8)
 """Places in the header: magic, rows, columns, rows ever written, rows the recorder has taken, writer has
@@ -31,7 +33,9 @@ class Ring:
         self.descriptor = descriptor
         self._memory = memory
         self.header: np.ndarray = np.frombuffer(memory, dtype=np.int64, count=8)
-        self.rows: Floats = np.frombuffer(memory, dtype=np.float64, offset=_HEADER_BYTES).reshape(capacity, width)
+        self.rows: Floats = np.frombuffer(memory, dtype=np.float64, offset=_HEADER_BYTES).reshape(
+            capacity, width
+        )
 
     @classmethod
     def create(cls, capacity: int, width: int) -> Ring:
@@ -90,12 +94,3 @@ class Ring:
     def close(self, ended: int = 1) -> None:
         """Tell readers that no more rows will come; `ended` is 1 for complete, 2 for ended by an error."""
         self.header[CLOSED] = ended
-
-
-@compiled
-def push(header: np.ndarray, rows: Floats, row: Floats) -> None:
-    """Write one row: data first, then the count, so that a reader never sees a half-written row as done."""
-    place = header[WRITTEN] % rows.shape[0]
-    for i in range(row.size):
-        rows[place, i] = row[i]
-    header[WRITTEN] += 1
