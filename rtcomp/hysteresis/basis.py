@@ -1,0 +1,98 @@
+"""What a hysteresis basis is: an operator with memory that turns an input into regressors.
+
+A model of hysteresis is ``force = offset + sum_i weight_i * regressor_i``. The basis holds the memory
+and is nonlinear; the weights are learned and enter linearly. Basis and learner combine freely.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats, Kernel, call_basis, compiled
+
+
+class Basis:
+    """Base of all bases. The kernel holds the arithmetic; an instance holds the places of its elements."""
+
+    name: ClassVar[str]
+    kernel: ClassVar[Kernel]
+    """``f(p, s, x, u)``: advance the state `s` to the input `u`, write the regressors `x`.
+
+    The first call on a fresh state only takes `u` as the starting point; `x` must then be zero and must
+    be handed in unchanged from call to call (a kernel writes only what the step touched).
+    """
+    source: ClassVar[str]
+
+    @property
+    def size(self) -> int:
+        """Number of regressors."""
+        raise NotImplementedError
+
+    def vector(self) -> Floats:
+        """Return the kernel's parameters `p`."""
+        raise NotImplementedError
+
+    def initial_state(self) -> Floats:
+        """Return the kernel's state `s` in the virgin (anhysteretic) state, before any input."""
+        raise NotImplementedError
+
+    def scales(self) -> Floats:
+        """Return the amplitude of each regressor when fully exercised, shape (size,); m for an input in m."""
+        raise NotImplementedError
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the basis as a model file writes it, with its name under ``model``."""
+        raise NotImplementedError
+
+    @classmethod
+    def from_dict(cls, entry: Mapping[str, Any]) -> Basis:
+        """Build the basis from a model file's entry (without ``model``)."""
+        return cls(**entry)
+
+
+B = TypeVar("B", bound=type[Basis])
+_BASES: dict[str, type[Basis]] = {}
+
+
+def register_basis(basis: B) -> B:
+    """Class decorator: make a basis known under its name."""
+    _BASES[basis.name] = basis
+    return basis
+
+
+def bases() -> dict[str, type[Basis]]:
+    """Return every known basis by name."""
+    return dict(_BASES)
+
+
+def basis_named(name: str) -> type[Basis]:
+    """Return the basis class of that name, or raise ConfigError naming the nearest."""
+    if name not in _BASES:
+        near = difflib.get_close_matches(name, _BASES, n=1, cutoff=0.5)
+        hint = f"; did you mean {near[0]!r}?" if near else f"; known are {', '.join(sorted(_BASES))}"
+        raise ConfigError(f"no hysteresis model is named {name!r}{hint}")
+    return _BASES[name]
+
+
+def regressors(basis: Basis, inputs: Floats, state: Floats | None = None) -> Floats:
+    """Run the basis over `inputs` (K,) and return the regressors of every sample, shape (K, size).
+
+    Starts from the virgin state, or goes on from `state` (changed in place) whose regressors were zero.
+    """
+    inputs = np.ascontiguousarray(inputs, dtype=np.float64)
+    out = np.empty((inputs.size, basis.size))
+    state = basis.initial_state() if state is None else state
+    _run(basis.kernel.address, basis.vector(), state, np.zeros(basis.size), inputs, out)
+    return out
+
+
+@compiled
+def _run(address: int, p: Floats, s: Floats, x: Floats, inputs: Floats, out: Floats) -> None:
+    for k in range(inputs.size):
+        call_basis(address, p.ctypes.data, s.ctypes.data, x.ctypes.data, inputs[k])
+        out[k] = x

@@ -1,0 +1,112 @@
+"""What a learner is: the rule that moves the weights when the model's output was wrong.
+
+When to learn is not the learner's business: the tick calls it when the axis has moved by the gate's
+distance since the last call (learning is driven by displacement, not by time), and not while frozen.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats, Kernel, call_basis, call_learner, compiled
+from rtcomp.hysteresis.basis import Basis
+
+
+class Learner:
+    """Base of all learners."""
+
+    name: ClassVar[str]
+    kernel: ClassVar[Kernel]
+    """``f(p, s, x, w, error)``: change the weights `w` from regressors `x` and error (7) = measured - w.x."""
+    source: ClassVar[str]
+
+    def vector(self, scales: Floats) -> Floats:
+        """Return the kernel's parameters for regressors of these amplitudes; `p[0]` is their number."""
+        raise NotImplementedError
+
+    def initial_state(self, scales: Floats) -> Floats:
+        """Return the kernel's state before it has learned anything."""
+        raise NotImplementedError
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return name and settings as a configuration writes them."""
+        raise NotImplementedError
+
+
+L = TypeVar("L", bound=type[Learner])
+_LEARNERS: dict[str, type[Learner]] = {}
+
+
+def register_learner(learner: L) -> L:
+    """Class decorator: make a learner known under its name."""
+    _LEARNERS[learner.name] = learner
+    return learner
+
+
+def learners() -> dict[str, type[Learner]]:
+    """Return every known learner by name."""
+    return dict(_LEARNERS)
+
+
+def build_learner(entry: Mapping[str, Any]) -> Learner:
+    """Build a learner from ``{learner: rls, forgetting: 0.9995, ...}``; raise ConfigError if it cannot be."""
+    settings = dict(entry)
+    name = settings.pop("learner", None)
+    if name not in _LEARNERS:
+        near = difflib.get_close_matches(str(name), _LEARNERS, n=1, cutoff=0.4)
+        hint = f"; did you mean {near[0]!r}?" if near else f"; known are {', '.join(sorted(_LEARNERS))}"
+        raise ConfigError(f"no learner is named {name!r}{hint}")
+    try:
+        return _LEARNERS[name](**settings)
+    except TypeError as error:
+        raise ConfigError(f"learner {name}: {error}") from error
+
+
+def learn(
+    basis: Basis,
+    learner: Learner,
+    inputs: Floats,
+    outputs: Floats,
+    gate: float = 0.0,
+    weights: Floats | None = None,
+) -> Floats:
+    """Learn on a recorded motion, sample by sample, as the loop does; return the weights (size,).
+
+    inputs: (K,) m. outputs: (K,) N. gate: displacement (m) between two updates. The virgin state is
+    assumed at the first sample. This is the operator and learner alone; the loop adds conditioning.
+    """
+    scales = basis.scales()
+    w = np.zeros(basis.size) if weights is None else weights.astype(np.float64, copy=True)
+    _learn(
+        basis.kernel.address,
+        basis.vector(),
+        basis.initial_state(),
+        learner.kernel.address,
+        learner.vector(scales),
+        learner.initial_state(scales),
+        np.zeros(basis.size),
+        w,
+        np.ascontiguousarray(inputs, dtype=np.float64),
+        np.ascontiguousarray(outputs, dtype=np.float64),
+        gate,
+    )
+    return w
+
+
+@compiled
+def _learn(
+    basis: int, bp: Floats, bs: Floats, learner: int, lp: Floats, ls: Floats, x: Floats, w: Floats,
+    inputs: Floats, outputs: Floats, gate: float,
+) -> None:  # fmt: skip
+    last = inputs[0]
+    for k in range(inputs.size):
+        call_basis(basis, bp.ctypes.data, bs.ctypes.data, x.ctypes.data, inputs[k])
+        if abs(inputs[k] - last) >= gate:
+            last = inputs[k]
+            error = outputs[k] - np.dot(w, x)
+            call_learner(learner, lp.ctypes.data, ls.ctypes.data, x.ctypes.data, w.ctypes.data, error)
