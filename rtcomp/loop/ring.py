@@ -12,15 +12,17 @@ from __future__ import annotations
 import mmap
 import os
 import tempfile
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 
-MAGIC, CAPACITY, WIDTH, WRITTEN, TAKEN, CLOSED, LOST, SPARE = range(8)
+MAGIC, CAPACITY, WIDTH, WRITTEN, TAKEN, CLOSED, LOST, FLUSHED = range(8)
 """Places in the header: magic, rows, columns, rows ever written, rows the recorder has taken, writer has
-closed (0 running, 1 complete, 2 ended by an error), rows overwritten before they were taken, not used."""
+closed (0 running, 1 complete, 2 ended by an error), rows overwritten before they were taken, rows that the
+recorder has handed to the file system."""
 
 _MAGIC = 0x72746370  # "rtcp"
 _HEADER_BYTES = 64
@@ -45,7 +47,7 @@ class Ring:
             descriptor = os.memfd_create("rtcomp-ring")
         else:
             handle, path = tempfile.mkstemp(prefix="rtcomp-ring-")
-            os.unlink(path)
+            Path(path).unlink()
             descriptor = handle
         os.ftruncate(descriptor, size)
         ring = cls(descriptor, mmap.mmap(descriptor, size), capacity, width)
@@ -75,22 +77,26 @@ class Ring:
     def take(self, most: int = 1 << 62) -> Floats:
         """Take the rows that wait, oldest first, as a copy of shape (rows, width). For the one recorder.
 
-        Rows overwritten before they could be taken are skipped and counted in the header's LOST.
+        Rows overwritten before or while they were copied are left out and counted in the header's LOST.
         """
         capacity = int(self.header[CAPACITY])
-        while True:
-            written, taken = int(self.header[WRITTEN]), int(self.header[TAKEN])
-            if written - taken > capacity:
-                self.header[LOST] += written - capacity - taken
-                taken = written - capacity
-            end = min(written, taken + most)
-            rows = self.rows[np.arange(taken, end) % capacity]
-            if int(self.header[WRITTEN]) - taken < capacity or end == taken:  # not overrun while copying
-                self.header[TAKEN] = end
-                return rows
-            self.header[LOST] += end - taken
-            self.header[TAKEN] = end
+        written, taken = int(self.header[WRITTEN]), int(self.header[TAKEN])
+        writing = int(self.header[CLOSED] == 0)
+        start = max(taken, written - capacity)
+        end = min(written, start + most)
+        rows: Floats = self.rows[np.arange(start, end) % capacity]
+        # The row being written at this moment, not yet counted, sits on the oldest one.
+        whole = min(max(start, int(self.header[WRITTEN]) + writing - capacity), end)
+        self.header[LOST] += whole - taken
+        self.header[TAKEN] = end
+        return rows[whole - start :]
 
     def close(self, ended: int = 1) -> None:
         """Tell readers that no more rows will come; `ended` is 1 for complete, 2 for ended by an error."""
         self.header[CLOSED] = ended
+
+    def release(self) -> None:
+        """Close the descriptor; the memory itself goes with the last array on it. Safe to call twice."""
+        if self.descriptor >= 0:
+            os.close(self.descriptor)
+            self.descriptor = -1

@@ -1,0 +1,154 @@
+"""A recording being written: HDF5 that opens everywhere, whatever happens to its writer.
+
+One 1-D float64 dataset per column at the root, attribute ``unit``; metadata as root attributes; the
+identifier's weights, decimated, in the group ``weights``. Append-only, SWMR, so that it can be read while
+it grows. The format is bounded to HDF5 1.10, the first with SWMR, so that older readers (MATLAB) open it.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import numpy.typing as npt
+from h5py import h5a, h5f, h5p
+
+from rtcomp.recording.superblock import clear_flags
+from rtcomp.units import COLUMN_UNITS, for_axis
+
+Floats = npt.NDArray[np.float64]
+
+CHUNK_ROWS = 2048
+WEIGHTS_PERIOD = 0.1
+"""s between two stored rows of weights."""
+_ENDED_BYTES = 64
+
+
+class RecordingFile:
+    """An HDF5 recording open for appending; `flush` makes what was appended safe from a kill."""
+
+    def __init__(
+        self,
+        path: Path,
+        columns: Sequence[str],
+        metadata: Mapping[str, Any],
+        weights: int = 0,
+        axis: str = "linear",
+    ) -> None:
+        """Create the file; raise FileExistsError where there is one, OSError where the disk refuses."""
+        if os.path.lexists(path):
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+        self._descriptor = -1
+        try:
+            self._file = _create(path)
+            self._columns = [self._dataset(self._file, c, COLUMN_UNITS.get(c, "1"), axis) for c in columns]
+            self._weights_time = self._weights = None
+            self._next_weights = -np.inf
+            if weights:
+                group = self._file.create_group("weights")
+                self._weights_time = self._dataset(group, "time", "s", axis)
+                self._weights = group.create_dataset(
+                    "weights", (0, weights), "f8", maxshape=(None, weights), chunks=(64, weights)
+                )
+            for key, value in metadata.items():
+                self._file.attrs[key] = _attribute(value)
+            self._file.attrs["format"] = "rtcomp recording 1"
+            self._file.attrs["complete"] = np.int64(0)
+            self._file.attrs["rows_lost"] = np.int64(0)
+            self._file.attrs.create("ended", b"no", dtype=f"S{_ENDED_BYTES}")
+            self._file.swmr_mode = True  # from here on: no new names, only more rows
+            self._descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC)
+            fcntl.flock(self._descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            clear_flags(self._descriptor)
+        except BaseException:
+            self.abandon()
+            path.unlink(missing_ok=True)
+            raise
+        self.rows = 0
+
+    @staticmethod
+    def _dataset(group: Any, name: str, unit: str, axis: str) -> Any:
+        dataset = group.create_dataset(name, (0,), "f8", maxshape=(None,), chunks=(CHUNK_ROWS,))
+        dataset.attrs["unit"] = for_axis(unit, axis)
+        return dataset
+
+    def append(self, rows: Floats) -> None:
+        """Append `rows` of shape (n, columns + weights), time (s) first; weights are decimated by it."""
+        if not len(rows):
+            return
+        end = self.rows + len(rows)
+        for i, dataset in enumerate(self._columns):
+            dataset.resize((end,))
+            dataset[self.rows : end] = rows[:, i]
+        self.rows = end
+        if self._weights is not None and self._weights_time is not None:
+            chosen = self._due(rows[:, 0])
+            if chosen:
+                at, to = len(self._weights_time), len(self._weights_time) + len(chosen)
+                self._weights.resize(to, axis=0)
+                self._weights[at:to] = rows[chosen, len(self._columns) :]
+                self._weights_time.resize((to,))
+                self._weights_time[at:to] = rows[chosen, 0]
+
+    def _due(self, time: Floats) -> list[int]:
+        """Return which of the rows at `time` begin a new period of the weights."""
+        chosen: list[int] = []
+        at = 0
+        while at < len(time):
+            at += int(np.searchsorted(time[at:], self._next_weights - 1e-9))
+            if at < len(time):
+                chosen.append(at)
+                self._next_weights = float(time[at]) + WEIGHTS_PERIOD
+        return chosen
+
+    def flush(self) -> None:
+        """Hand everything to the file system, in an order in which any prefix of it is a valid file."""
+        self._file.flush()
+        clear_flags(self._descriptor)
+
+    def mark(self, complete: bool, rows_lost: int, ended: str) -> None:
+        """Write how the run ended into the root attributes, in place (SWMR allows no new ones)."""
+        self._set("complete", np.int64(complete))
+        self._set("rows_lost", np.int64(rows_lost))
+        self._set("ended", np.bytes_(ended.encode()[:_ENDED_BYTES]))
+
+    def _set(self, name: str, value: Any) -> None:
+        attribute = h5a.open(self._file.id, name.encode())
+        attribute.write(np.array(value, dtype=attribute.dtype))
+
+    def close(self) -> None:
+        """Close as the library does it: flags cleared, blocks that were not needed given back."""
+        self._file.close()
+        self.abandon()
+
+    def abandon(self) -> None:
+        """Let go of the descriptor only; for a file that cannot be written any more."""
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+
+def _create(path: Path) -> Any:
+    """Create an HDF5 file whose root attributes lie in the object header, where they change in place."""
+    creation = h5p.create(h5p.FILE_CREATE)
+    creation.set_attr_phase_change(1000, 900)
+    access = h5p.create(h5p.FILE_ACCESS)
+    access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
+    access.set_fclose_degree(h5f.CLOSE_STRONG)
+    return h5py.File(h5f.create(os.fsencode(path), h5f.ACC_EXCL, creation, access))
+
+
+def _attribute(value: Any) -> Any:
+    """Return `value` as something an attribute holds: text, numbers, arrays as they are, the rest as JSON."""
+    if isinstance(value, bool):
+        return np.int64(value)
+    if isinstance(value, str | int | float | np.ndarray | np.generic):
+        return value
+    return json.dumps(value)

@@ -1,0 +1,126 @@
+"""The recorder's own process: takes rows from the ring, appends them to the recording, outlives the loop.
+
+Started by `rtcomp.recording.recorder`, never by hand. The job comes as one line of JSON on standard input,
+answers go as lines of JSON to standard output: one when the file is open (or why it cannot be), one at the
+end. It ends when the ring is closed and drained, or when the process that runs the loop has gone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import select
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import Any, NoReturn
+
+from rtcomp.loop.ring import CLOSED, FLUSHED, LOST, Ring
+from rtcomp.recording.file import RecordingFile
+
+DRAIN_S = 0.02
+"""How often waiting rows are taken from the ring."""
+
+
+class _Parent:
+    """Watches the process that runs the loop: by its pidfd where there is one, always by its number."""
+
+    def __init__(self, pid: int) -> None:
+        self._pid = pid
+        self._descriptor = -1
+        if hasattr(os, "pidfd_open"):
+            with contextlib.suppress(OSError):  # it has gone already; `gone` sees that by its number
+                self._descriptor = os.pidfd_open(pid)
+
+    def gone(self, wait_s: float) -> bool:
+        """Return whether the parent has ended; wait for that up to `wait_s` seconds."""
+        if os.getppid() != self._pid:
+            return True
+        if self._descriptor < 0:
+            time.sleep(wait_s)
+            return os.getppid() != self._pid
+        return bool(select.select([self._descriptor], [], [], wait_s)[0])
+
+
+def _answer(**what: Any) -> None:
+    """Send one line to the parent, if it is still there to read it."""
+    with contextlib.suppress(BrokenPipeError):
+        os.write(sys.stdout.fileno(), (json.dumps(what) + "\n").encode())
+
+
+def _give_up(error: OSError) -> NoReturn:
+    """Say why the file cannot be written, and end."""
+    _answer(error=os.strerror(error.errno) if error.errno else str(error))
+    # The library would write once more on its way out; what has been flushed stays valid as it is.
+    os._exit(1)
+
+
+def _prepare() -> list[int]:
+    """Take the process out of the loop's fate and way; return the list that gathers signals to end."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    asked: list[int] = []
+    signal.signal(signal.SIGTERM, lambda number, _frame: asked.append(number))
+    if hasattr(os, "sched_setscheduler"):
+        # A loop pinned to one core in a real-time class must not have its recorder there beside it.
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        with contextlib.suppress(OSError):
+            os.sched_setaffinity(0, range(os.cpu_count() or 1))
+    with contextlib.suppress(OSError):  # only the privileged may; a busy machine then delays flushes more
+        os.setpriority(os.PRIO_PROCESS, 0, -10)
+    return asked
+
+
+def _record(ring: Ring, file: RecordingFile, parent: _Parent, flush_s: float, asked: list[int]) -> str:
+    """Run until there is nothing more to come; return how it ended, everything taken being flushed."""
+    header = ring.header
+    pause = min(DRAIN_S, flush_s)
+    flushed_at = time.monotonic()
+    ended = ""
+    while not ended:
+        hurry = ring.waiting > ring.rows.shape[0] // 4
+        # Each sign of the end is read before the last rows are taken: none can come after it.
+        if parent.gone(0.0 if hurry else pause):
+            ended = "loop died"
+        if header[CLOSED]:
+            ended = "complete" if header[CLOSED] == 1 else "error"
+        elif asked:
+            ended = ended or "recorder told to end"
+        file.append(ring.take())
+        now = time.monotonic()
+        if ended or now - flushed_at >= flush_s:
+            file.flush()
+            header[FLUSHED] = file.rows
+            flushed_at = now
+    return ended
+
+
+def main() -> int:
+    """Do the job on standard input; exit status 0 when the recording was closed as it should be."""
+    asked = _prepare()
+    job = json.loads(sys.stdin.readline())
+    parent = _Parent(job["parent"])
+    try:
+        ring = Ring.attach(job["ring"])
+        file = RecordingFile(
+            Path(job["path"]), job["columns"], job["metadata"], job["weights_columns"], job["axis"]
+        )
+    except OSError as error:
+        _give_up(error)
+    _answer(ready=True)
+    try:
+        ended = _record(ring, file, parent, job["flush_s"], asked)
+        file.mark(ended == "complete", int(ring.header[LOST]), ended)
+        file.close()
+    except OSError as error:
+        _give_up(error)
+    _answer(rows=file.rows, rows_lost=int(ring.header[LOST]), ended=ended)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
