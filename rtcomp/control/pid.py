@@ -76,11 +76,11 @@ def pid_vector(
     elif anti_windup == "conditional":
         share = -1.0
     elif anti_windup == "back-calculation":
-        time = _tracking_time(kp, ki, kd, period) if tracking_time is None else tracking_time
-        if not (math.isfinite(time) and time > 0.0):
+        time = _tracking_time(kp, ki, kd) if tracking_time is None else tracking_time
+        if not time > 0.0 and tracking_time is not None:
             raise ConfigError(f"controller: tracking_time is {time:g} s; it must be positive")
         # More than the whole excess a tick would overshoot it: the loop through the limit would ring.
-        share = min(period / time, 1.0) if ki > 0.0 else 0.0
+        share = period / max(time, period) if ki > 0.0 else 0.0
     else:
         raise ConfigError(
             f"controller: anti_windup is {anti_windup!r}; "
@@ -91,11 +91,10 @@ def pid_vector(
     return np.array([kp, ki, kd, pole, on_measurement, share, voltage_limit, period], dtype=np.float64)
 
 
-def _tracking_time(kp: float, ki: float, kd: float, period: float) -> float:
-    if ki == 0.0 or kp == 0.0:
-        return period
-    integral_time = kp / ki
-    return max(period, math.sqrt(integral_time * kd / kp) if kd > 0.0 else integral_time)
+def _tracking_time(kp: float, ki: float, kd: float) -> float:
+    if ki == 0.0:
+        return math.inf
+    return math.sqrt(kd / ki) if kd > 0.0 else kp / ki
 
 
 def pid_state() -> Floats:
