@@ -1,4 +1,4 @@
-"""Write YAML that every reader reads back alike: numbers with a dot and a signed exponent, units as remarks."""
+"""Write YAML that every reader reads back alike: numbers with a dot and a signed exponent, units behind."""
 
 from __future__ import annotations
 
