@@ -7,6 +7,7 @@ it grows. The format is bounded to HDF5 1.10, the first with SWMR, so that older
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import fcntl
 import json
@@ -28,6 +29,7 @@ Floats = npt.NDArray[np.float64]
 CHUNK_ROWS = 2048
 WEIGHTS_PERIOD = 0.1
 """s between two stored rows of weights."""
+_WEIGHTS_CHUNK = 64
 _ENDED_BYTES = 64
 
 
@@ -55,7 +57,7 @@ class RecordingFile:
                 group = self._file.create_group("weights")
                 self._weights_time = self._dataset(group, "time", "s", axis)
                 self._weights = group.create_dataset(
-                    "weights", (0, weights), "f8", maxshape=(None, weights), chunks=(64, weights)
+                    "weights", (0, weights), "f8", maxshape=(None, weights), chunks=(_WEIGHTS_CHUNK, weights)
                 )
             for key, value in metadata.items():
                 self._file.attrs[key] = _attribute(value)
@@ -66,12 +68,15 @@ class RecordingFile:
             self._file.swmr_mode = True  # from here on: no new names, only more rows
             self._descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC)
             fcntl.flock(self._descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            clear_flags(self._descriptor)
+            self._reserve = 8 * (3 * CHUNK_ROWS * len(columns) + 3 * _WEIGHTS_CHUNK * weights) + 65536
+            self._end = clear_flags(self._descriptor)
+            self.reserve()
         except BaseException:
             self.abandon()
             path.unlink(missing_ok=True)
             raise
         self.rows = 0
+        self._unflushed = 0
 
     @staticmethod
     def _dataset(group: Any, name: str, unit: str, axis: str) -> Any:
@@ -80,7 +85,10 @@ class RecordingFile:
         return dataset
 
     def append(self, rows: Floats) -> None:
-        """Append `rows` of shape (n, columns + weights), time (s) first; weights are decimated by it."""
+        """Append `rows` of shape (n, columns + weights), time (s) first; weights are decimated by it.
+
+        At most CHUNK_ROWS rows at once; `flush` when `full` says so.
+        """
         if not len(rows):
             return
         end = self.rows + len(rows)
@@ -88,6 +96,7 @@ class RecordingFile:
             dataset.resize((end,))
             dataset[self.rows : end] = rows[:, i]
         self.rows = end
+        self._unflushed += len(rows)
         if self._weights is not None and self._weights_time is not None:
             chosen = self._due(rows[:, 0])
             if chosen:
@@ -111,7 +120,24 @@ class RecordingFile:
     def flush(self) -> None:
         """Hand everything to the file system, in an order in which any prefix of it is a valid file."""
         self._file.flush()
-        clear_flags(self._descriptor)
+        self._end = clear_flags(self._descriptor)
+        self._unflushed = 0
+
+    @property
+    def full(self) -> bool:
+        """Whether so much was appended since the last flush that the next rows wait for one."""
+        return self._unflushed >= CHUNK_ROWS
+
+    def reserve(self) -> None:
+        """Have the disk set aside what the next rows will need; raise OSError where it has not got it.
+
+        To be called after `flush`. A library that runs out of space in the middle of a flush leaves rows
+        counted but not written; this way the disk is found full between two flushes, with everything
+        recorded so far in order.
+        """
+        size = os.fstat(self._descriptor).st_size
+        if size < self._end + self._reserve:
+            os.posix_fallocate(self._descriptor, size, self._end + 2 * self._reserve - size)
 
     def mark(self, complete: bool, rows_lost: int, ended: str) -> None:
         """Write how the run ended into the root attributes, in place (SWMR allows no new ones)."""
@@ -124,13 +150,17 @@ class RecordingFile:
         attribute.write(np.array(value, dtype=attribute.dtype))
 
     def close(self) -> None:
-        """Close as the library does it: flags cleared, blocks that were not needed given back."""
+        """Close as the library does it, and give back the space that was not needed."""
         self._file.close()
-        self.abandon()
+        os.ftruncate(self._descriptor, clear_flags(self._descriptor))
+        os.close(self._descriptor)
+        self._descriptor = -1
 
     def abandon(self) -> None:
-        """Let go of the descriptor only; for a file that cannot be written any more."""
+        """Let go of a file that cannot be written any more, with what was flushed in it."""
         if self._descriptor >= 0:
+            with contextlib.suppress(OSError, ValueError):  # the caller reports why it could not be written
+                clear_flags(self._descriptor)
             os.close(self._descriptor)
             self._descriptor = -1
 

@@ -37,7 +37,8 @@ class RecorderSummary:
     complete: bool
     """The loop closed the ring as it should, and everything it wrote is in the file."""
     ended: str
-    """``complete``, ``error`` (the loop ended by one), ``recorder told to end``, or ``recorder died``."""
+    """``complete``, ``error`` (the loop ended by one), ``recorder told to end``, ``stopped: why``
+    (the disk is full) or ``recorder died``."""
     problem: str = ""
     """What went wrong with the recorder, one line; empty where nothing did."""
 
@@ -133,18 +134,20 @@ class Recorder:
         if not header[CLOSED]:
             self._ring.close(2)
         answer = self._answer(timeout)
-        problem = answer.get("error", "") or (self._last_words() if not answer else "")
+        last_words = "" if answer else self._last_words()
         status = self._end(2.0 if answer else 0.0)
-        if answer and not answer.get("error"):
-            ended, rows, lost = str(answer["ended"]), int(answer["rows"]), int(answer["rows_lost"])
-        else:
-            rows, ended = int(header[FLUSHED]), "recorder died"
-            lost = int(header[WRITTEN]) - rows
-            died = f"ended by signal {-status}" if status < 0 else f"ended with status {status}"
-            problem = f"{self.path}: the recorder {died}; {_one_line(problem or 'it gave no reason')}"
-        self._summary = RecorderSummary(
-            self.path, rows, lost, ended == "complete" and lost == 0, ended, problem
-        )
+        rows = int(answer.get("rows", header[FLUSHED]))
+        lost = int(header[WRITTEN]) - rows
+        ended = answer.get("ended", "recorder died")
+        problem = ""
+        if "ended" not in answer:
+            died = f"was ended by signal {-status}" if status < 0 else "gave up"
+            why = answer.get("error") or last_words or "it gave no reason"
+            problem = f"{self.path}: the recorder {died}: {_one_line(why)}"
+        elif ended.startswith("stopped"):
+            problem = f"{self.path}: the recorder {ended}"
+        complete = ended == "complete" and lost == 0
+        self._summary = RecorderSummary(self.path, rows, lost, complete, ended, problem)
         return self._summary
 
     def _answer(self, timeout_s: float) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import select
 import signal
 import sys
@@ -18,7 +19,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from rtcomp.loop.ring import CLOSED, FLUSHED, LOST, Ring
-from rtcomp.recording.file import RecordingFile
+from rtcomp.recording.file import CHUNK_ROWS, RecordingFile
 
 DRAIN_S = 0.02
 """How often waiting rows are taken from the ring."""
@@ -50,9 +51,12 @@ def _answer(**what: Any) -> None:
         os.write(sys.stdout.fileno(), (json.dumps(what) + "\n").encode())
 
 
-def _give_up(error: OSError) -> NoReturn:
+def _give_up(error: OSError | RuntimeError) -> NoReturn:
     """Say why the file cannot be written, and end."""
-    _answer(error=os.strerror(error.errno) if error.errno else str(error))
+    number = getattr(error, "errno", None)
+    inside = re.search(r"errno = (\d+)", str(error))  # the library's own, where Python's is missing
+    number = number or (int(inside[1]) if inside else 0)
+    _answer(error=os.strerror(number) if number else str(error))
     # The library would write once more on its way out; what has been flushed stays valid as it is.
     os._exit(1)
 
@@ -90,13 +94,28 @@ def _record(ring: Ring, file: RecordingFile, parent: _Parent, flush_s: float, as
             ended = "complete" if header[CLOSED] == 1 else "error"
         elif asked:
             ended = ended or "recorder told to end"
-        file.append(ring.take())
-        now = time.monotonic()
-        if ended or now - flushed_at >= flush_s:
-            file.flush()
-            header[FLUSHED] = file.rows
-            flushed_at = now
-    return ended
+        waiting = ring.waiting
+        more = True
+        while more:
+            file.append(ring.take(min(waiting, CHUNK_ROWS)))
+            waiting -= CHUNK_ROWS
+            more = waiting > 0
+            if file.full or time.monotonic() - flushed_at >= flush_s:
+                if problem := _flush(ring, file):
+                    return problem
+                flushed_at = time.monotonic()
+    return _flush(ring, file) or ended
+
+
+def _flush(ring: Ring, file: RecordingFile) -> str:
+    """Make what was taken safe from a kill; return why no more can be recorded, empty where it can."""
+    file.flush()
+    ring.header[FLUSHED] = file.rows
+    try:
+        file.reserve()
+    except OSError as error:
+        return f"stopped: {error.strerror}"
+    return ""
 
 
 def main() -> int:
@@ -109,16 +128,17 @@ def main() -> int:
         file = RecordingFile(
             Path(job["path"]), job["columns"], job["metadata"], job["weights_columns"], job["axis"]
         )
-    except OSError as error:
+    except (OSError, RuntimeError) as error:  # the library raises either
         _give_up(error)
     _answer(ready=True)
     try:
         ended = _record(ring, file, parent, job["flush_s"], asked)
         file.mark(ended == "complete", int(ring.header[LOST]), ended)
         file.close()
-    except OSError as error:
+    except (OSError, RuntimeError) as error:
+        file.abandon()
         _give_up(error)
-    _answer(rows=file.rows, rows_lost=int(ring.header[LOST]), ended=ended)
+    _answer(rows=file.rows, ended=ended)
     return 0
 
 

@@ -55,19 +55,21 @@ def _add(word: int, data: bytes, start: int) -> int:
     return (word + int.from_bytes(data[start : start + 4], "little")) & _WORD
 
 
-def clear_flags(descriptor: int) -> bool:
+def clear_flags(descriptor: int) -> int:
     """Clear the consistency flags of the HDF5 file behind `descriptor` (open for reading and writing).
 
-    Also grows the file to its recorded end where blocks are allocated but not yet written, which the
-    library would call truncated. Returns whether flags were set. Raises OSError where the disk refuses.
+    Returns where the file ends by its superblock (bytes). Also grows the file to there where blocks are
+    allocated but not yet written, which the library would call truncated. Raises OSError where the disk
+    refuses, ValueError where the file is not HDF5 with superblock version 3.
     """
     block = bytearray(os.pread(descriptor, SIZE, 0))
-    if block[:8] != _SIGNATURE or len(block) < SIZE or block[_VERSION] != 3 or not block[_FLAGS]:
-        return False
+    if len(block) < SIZE or block[:8] != _SIGNATURE or block[_VERSION] != 3:
+        raise ValueError("not an HDF5 file with superblock version 3")
     end = int.from_bytes(block[_END_OF_FILE : _END_OF_FILE + 8], "little")
-    if os.fstat(descriptor).st_size < end:
-        os.ftruncate(descriptor, end)
-    block[_FLAGS] = 0
-    block[_CHECKSUM:] = lookup3(bytes(block[:_CHECKSUM])).to_bytes(4, "little")
-    os.pwrite(descriptor, bytes(block), 0)
-    return True
+    if block[_FLAGS]:
+        if os.fstat(descriptor).st_size < end:
+            os.ftruncate(descriptor, end)
+        block[_FLAGS] = 0
+        block[_CHECKSUM:] = lookup3(bytes(block[:_CHECKSUM])).to_bytes(4, "little")
+        os.pwrite(descriptor, bytes(block), 0)
+    return end
