@@ -1,0 +1,126 @@
+"""What the terminal shows: progress with figures, and the summary. The only module that knows rich."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, ProgressColumn, Task, TaskID, TextColumn
+from rich.progress import Progress as RichProgress
+from rich.table import Table
+from rich.text import Text
+
+from rtcomp.report.page import Row
+from rtcomp.report.quantities import si, written
+
+__all__ = ["Progress", "Row", "print_summary", "si", "summary_table"]
+
+_PERIOD = 1.0 / 8.0
+
+
+class _Percent(ProgressColumn):
+    """Done in whole percent; 100 only when it is done."""
+
+    def render(self, task: Task) -> Text:
+        return Text(f"{int(task.completed * 100.0):3d} %", style="bold")
+
+
+class _Elapsed(ProgressColumn):
+    """Seconds since the start."""
+
+    def render(self, task: Task) -> Text:
+        seconds = int(task.elapsed or 0.0)
+        return Text(f"{seconds // 60}:{seconds % 60:02d}", style="dim")
+
+
+class _Figures(ProgressColumn):
+    """The figures of the job: ``held-out 1.3 %   rms 12 nm``."""
+
+    def render(self, task: Task) -> Text:
+        line = Text(no_wrap=True, overflow="ellipsis")
+        for name, value in task.fields["figures"].items():
+            line.append(f"{name} ", style="dim")
+            line.append(f"{value}   ")
+        line.rstrip()
+        return line
+
+
+class Progress:
+    """A progress line with figures, for a ``with`` statement; updates at most eight times a second.
+
+    Silent when `quiet` (``--json``) or when the output (standard error unless `console` is given) is not a
+    terminal. It starts no thread: it draws inside `update`, so a loop that shares the interpreter is never
+    held up by it. Ask `due` first where the figures cost time to make.
+    """
+
+    def __init__(self, title: str, *, quiet: bool = False, console: Console | None = None) -> None:
+        self._console = console or Console(stderr=True)
+        self._on = not quiet and self._console.is_terminal
+        self._next = 0.0
+        self._bar: RichProgress | None = None
+        self._task = TaskID(0)
+        self._title = title
+        self._done = 0.0
+        self._figures: dict[str, Any] = {}
+
+    def __enter__(self) -> Progress:
+        if self._on:
+            self._bar = RichProgress(
+                TextColumn("{task.description}", markup=False), BarColumn(bar_width=24),
+                _Percent(), _Elapsed(), _Figures(), console=self._console, auto_refresh=False,
+            )  # fmt: skip
+            self._bar.start()
+            self._task = self._bar.add_task(self._title, total=1.0, figures={})
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._draw()
+            self._bar.stop()
+            self._bar = None
+
+    @property
+    def due(self) -> bool:
+        """Whether `update` would draw now."""
+        return self._bar is not None and time.monotonic() >= self._next
+
+    def update(self, done: float, figures: Mapping[str, Any] | None = None) -> None:
+        """Say that the share `done` (0 to 1, clipped) is finished, with figures as they are to be read."""
+        self._done = min(max(done, 0.0), 1.0)
+        if figures is not None:
+            self._figures = dict(figures)
+        if self.due:
+            self._next = time.monotonic() + _PERIOD
+            self._draw()
+
+    def _draw(self) -> None:
+        assert self._bar is not None
+        self._bar.update(self._task, completed=self._done, figures=self._figures, refresh=True)
+
+
+def summary_table(title: str, rows: Sequence[Row | tuple[Any, ...]]) -> Table:
+    """Return the closing table: name, value with its unit, note. Rows as in the page (name, value, unit,
+    note).
+    """
+    table = Table(title=Text(title, style="bold"), title_justify="left", show_header=False, pad_edge=False)
+    table.add_column(overflow="fold")
+    table.add_column(justify="right", style="bold", overflow="fold")
+    lines = [Row(*row) for row in rows]
+    noted = any(row.note for row in lines)
+    if noted:
+        table.add_column(style="dim", overflow="fold")
+    for row in lines:
+        # Text, not markup: a name from a file may hold square brackets.
+        cells = [Text(str(row.name)), Text(written(row.value, row.unit))]
+        table.add_row(*cells, *([Text(str(row.note))] if noted else []))
+    return table
+
+
+def print_summary(title: str, rows: Sequence[Row | tuple[Any, ...]], console: Console | None = None) -> None:
+    """Print `summary_table` to standard output."""
+    (console or Console()).print(summary_table(title, rows))
