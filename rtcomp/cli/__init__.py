@@ -1,1 +1,1 @@
-"""cli"""
+"""The command line, one file a command. Commands are imported only when they run."""

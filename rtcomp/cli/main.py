@@ -1,0 +1,154 @@
+"""The command `rtcomp`: finds its commands, and turns every error into one line and an exit status.
+
+Exit status: 0 done, 2 unusable input or a device that fails, 70 a defect of the program, 130 interrupted,
+141 nobody reads the output any more.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+
+import click
+from click.exceptions import NoArgsIsHelpError
+
+from rtcomp import __version__
+from rtcomp.cli.lazy import LazyGroup
+from rtcomp.errors import RtcompError
+
+INTERNAL, INTERRUPTED, BROKEN_PIPE = 70, 130, 141
+
+COMMANDS = {
+    "demo": ("rtcomp.cli.demo:demo", "Identify and compensate a simulated stage, to the report."),
+    "simulate": ("rtcomp.cli.simulate:simulate", "Simulate a stage, in closed loop or open, and record it."),
+    "identify": ("rtcomp.cli.identify:identify", "Identify the friction's hysteresis while the stage moves."),
+    "compensate": ("rtcomp.cli.compensate:compensate", "Follow a reference with the friction cancelled."),
+    "replay": ("rtcomp.cli.replay:replay", "Put a stage's force balance beside a recording, row by row."),
+    "convert": ("rtcomp.cli.convert:convert", "Turn a recording into another format."),
+    "drivers": ("rtcomp.cli.drivers:drivers", "List the installed drivers and their settings."),
+    "plant": ("rtcomp.cli.plant:plant", "Stand in for hardware: serve a simulated stage on a port."),
+}
+"""Every command: where it stands, and what it does in one line (so that help imports none of them)."""
+
+
+@click.group(cls=LazyGroup, table=COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="rtcomp", message="%(prog)s %(version)s")
+def cli() -> None:
+    """Identify friction hysteresis while an axis runs, and cancel it inside a fixed-rate loop.
+
+    \b
+    Start with:
+      rtcomp demo --out out/demo
+    """
+
+
+def main() -> None:
+    """Run the command line of this process and exit with its status."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run `rtcomp` with `arguments` and return the exit status; errors are one line on standard error."""
+    if "_RTCOMP_COMPLETE" in os.environ:
+        cli.main(args=list(arguments), prog_name="rtcomp")  # answers the shell's completion, then exits
+    try:
+        status = _invoke(list(arguments) or ["--help"])
+        sys.stdout.flush()
+        return status
+    except click.exceptions.Exit as done:
+        return done.exit_code
+    except NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        return 0
+    except click.ClickException as error:
+        return _say(_usage(error), 2)
+    except RtcompError as error:
+        _trace()
+        return _say(_with_notes(error), error.exit_status)
+    except (KeyboardInterrupt, click.Abort) as error:
+        return _say("; ".join(["interrupted", *_notes(error)]), INTERRUPTED, prefix="")
+    except BrokenPipeError as error:
+        if _stdout_is_gone():
+            return BROKEN_PIPE
+        return _defect(error)
+    except OSError as error:
+        if error.strerror is None:
+            return _defect(error)
+        _trace()
+        what = f"{error.filename}: " if error.filename is not None else ""
+        return _say("; ".join([f"{what}{error.strerror.lower()}", *_notes(error)]), 2)
+    except Exception as error:
+        return _defect(error)
+
+
+def _invoke(arguments: list[str]) -> int:
+    # Not click's own `main`, which prints errors over several lines and takes every EPIPE for a closed pipe.
+    with cli.make_context("rtcomp", arguments) as context:
+        result = cli.invoke(context)
+    return result if isinstance(result, int) else 0
+
+
+def _usage(error: click.ClickException) -> str:
+    message = error.format_message()
+    context = getattr(error, "ctx", None)
+    if isinstance(error, click.NoSuchOption):
+        message = f"no option {error.option_name}"
+        known = (
+            [o for p in context.command.get_params(context) for o in p.opts] if context is not None else []
+        )
+        near = difflib.get_close_matches(error.option_name, known, n=1)
+        message += f"; did you mean {near[0]}?" if near else ""
+    if isinstance(error, click.UsageError) and context is not None:
+        message = message.rstrip(".")
+        end = "" if message.endswith("?") else ";"
+        message = f"{message[:1].lower()}{message[1:]}{end} see {context.command_path} --help"
+    return message
+
+
+def _defect(error: Exception) -> int:
+    if not _trace():
+        what = f"{type(error).__name__}: {_with_notes(error)}"
+        return _say(f"internal error ({what}); set RTCOMP_DEBUG=1 to see where", INTERNAL)
+    return INTERNAL
+
+
+def _trace() -> bool:
+    """Print the traceback of the error at hand if RTCOMP_DEBUG=1 asks for it."""
+    wanted = os.environ.get("RTCOMP_DEBUG", "") not in ("", "0")
+    if wanted:
+        traceback.print_exc()
+    return wanted
+
+
+def _notes(error: BaseException) -> list[str]:
+    return list(getattr(error, "__notes__", []))
+
+
+def _with_notes(error: BaseException) -> str:
+    return "; ".join([str(error), *_notes(error)])
+
+
+def _say(message: str, status: int, prefix: str = "error: ") -> int:
+    line = prefix + " ".join(message.split())
+    try:
+        click.echo(line, err=True)
+    except OSError:  # standard error is closed; the status still says it
+        return status
+    return status
+
+
+def _stdout_is_gone() -> bool:
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # The interpreter flushes once more at exit, and would complain.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return True
+    return False
+
+
+if __name__ == "__main__":
+    main()
