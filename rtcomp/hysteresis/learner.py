@@ -13,8 +13,8 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from rtcomp.errors import ConfigError
-from rtcomp.kernels import Floats, Kernel, call_basis, call_learner, compiled
 from rtcomp.hysteresis.basis import Basis
+from rtcomp.kernels import Floats, Kernel, call_basis, call_learner, compiled
 
 
 class Learner:

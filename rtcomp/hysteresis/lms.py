@@ -13,7 +13,7 @@ from rtcomp.kernels import Floats, learner_kernel
 
 @learner_kernel
 def lms(p: Floats, s: Floats, x: Floats, w: Floats, error: float) -> None:
-    """p: N, learning factor mu (N/m^3... weight per error and regressor)."""
+    """p: N, learning factor mu (1/m^2)."""
     gain = p[1] * error
     for i in range(int(p[0])):
         w[i] += gain * x[i]

@@ -11,6 +11,10 @@ INVALID = 2
 """Status of a sample whose position must not be used."""
 
 
+class EndOfRun(Exception):  # noqa: N818 - no error: a recording that plays the stage has been played
+    """Raised by `exchange` where the device has no more samples to give; the run ends well."""
+
+
 class Sample(NamedTuple):
     """What a device says in one exchange."""
 

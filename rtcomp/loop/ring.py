@@ -70,6 +70,11 @@ class Ring:
         return int(self.header[WRITTEN])
 
     @property
+    def capacity(self) -> int:
+        """Rows that fit."""
+        return int(self.header[CAPACITY])
+
+    @property
     def waiting(self) -> int:
         """Rows that the recorder has not taken yet."""
         return int(self.header[WRITTEN] - self.header[TAKEN])

@@ -13,11 +13,21 @@ The chain, run for every integration step, in this order::
     sensor       true to measured position       (changes SENSED; once a tick, not a step)
 
 Within a place, effects run by `order`, lowest first.
+
+To feed an effect forward, there are two ways, and its place says which:
+
+- An effect on a signal on its way (VOLTS through the drive, SENSED through the sensor) has, where it can be
+  undone, an `inverse`: a kernel with the same `p` and `s` that turns what comes out into what went in. The
+  inverses of a chain run in reverse order.
+- An effect that adds a force or changes a factor (DRIVE, PUSH, FRICTION, GAIN, MASS, REACH, SCALE) needs
+  none: its own kernel is run on the reference with a state of its own, and what it adds is taken away, what
+  it multiplies is divided by.
 """
 
 from __future__ import annotations
 
 import enum
+import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -53,14 +63,15 @@ class Parameter:
 
     def check(self, value: Any, owner: str) -> float:
         """Return `value` as a float, or raise ConfigError naming the parameter, the value and the range."""
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        if isinstance(value, bool) or not isinstance(value, numbers.Real):
             raise ConfigError(f"{owner}: {self.name} is {value!r}; it must be a number ({self.unit})")
         number = float(value)
         inside = self.low < number <= self.high if self.open_low else self.low <= number <= self.high
         if not np.isfinite(number) or not inside:
             bracket = "(" if self.open_low else "["
             raise ConfigError(
-                f"{owner}: {self.name} is {number:g} {self.unit}; allowed is {bracket}{self.low:g}, {self.high:g}]"
+                f"{owner}: {self.name} is {number:g} {self.unit}; "
+                f"allowed is {bracket}{self.low:g}, {self.high:g}]"
             )
         return number
 
@@ -82,6 +93,15 @@ class Effect:
     """How it looks in a recording."""
     experiment: ClassVar[str]
     """The motion that shows it best."""
+    example: ClassVar[Mapping[str, Any]]
+    """A representative entry, as `from_dict` takes it, that shows within the motion of the contract tests:
+    strokes of +-1 mm and of micrometres, speeds to 50 mm/s, +-8 V, 4 s. The tests run on it by themselves."""
+    neutral: ClassVar[Mapping[str, Any] | None] = None
+    """Values that, put over the example, make it change nothing; None where there are none."""
+    inverse: ClassVar[Kernel | None] = None
+    """Undoes the effect on the signal that it passes on (see above); None where it cannot or need not."""
+    element: ClassVar[Sequence[Parameter]] = ()
+    """Parameters of each entry of its list, where it takes one (see `lists.ListEffect`)."""
     order: ClassVar[int] = 50
     states: ClassVar[int] = 0
     """Length of the kernel's own state."""
@@ -90,7 +110,9 @@ class Effect:
         known = {p.name for p in self.parameters}
         for key in values:
             if key not in known:
-                raise ConfigError(f"{self.name}: unknown parameter {key!r}; it has {', '.join(sorted(known))}")
+                raise ConfigError(
+                    f"{self.name}: unknown parameter {key!r}; it has {', '.join(sorted(known))}"
+                )
         self.values: dict[str, float] = {}
         for parameter in self.parameters:
             value = values.get(parameter.name, parameter.default)

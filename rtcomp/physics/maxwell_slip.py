@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
 import numpy as np
 
-from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
-from rtcomp.physics.effect import Effect, Parameter, Place
+from rtcomp.physics.effect import Parameter, Place
+from rtcomp.physics.lists import ListEffect
 from rtcomp.physics.wires import FRICTION, MOVED, REACH, SCALE
 
 STIFFNESS = Parameter("stiffness", "N/m", -1e12, 1e12, "spring of the element")
@@ -31,31 +28,22 @@ def maxwell_slip(p: Floats, s: Floats, w: Floats) -> None:
 
 
 @register
-class MaxwellSlip(Effect):
+class MaxwellSlip(ListEffect):
     """Stop elements in parallel; `elements` is a list of (stiffness N/m, reach m)."""
 
     name = "maxwell-slip"
     place = Place.FRICTION
-    parameters = (STIFFNESS, REACH_M)
+    parameters = ()
+    element = (STIFFNESS, REACH_M)
     kernel = maxwell_slip
     says = "presliding hysteresis of parallel spring and slider elements; a yielded element pushes stiffness * reach"
     equation = "F = sum k_i z_i,  z_i <- clip(z_i + dx, -r_i, r_i)"
     source = "Iwan (1966), J. Applied Mechanics 33(4); Lampaert, Swevers, Al-Bender (2002), IEEE TAC 47(4)"
-    signature = "closed hysteresis loops of force against position whose branches are the virgin curve doubled"
+    signature = (
+        "closed hysteresis loops of force against position whose branches are the virgin curve doubled"
+    )
     experiment = "nested reversals of decreasing size inside the presliding range"
-
-    def __init__(self, elements: Sequence[tuple[float, float]]) -> None:
-        if not elements:
-            raise ConfigError("friction is empty; give at least one element {stiffness, reach}")
-        self.elements = [
-            (STIFFNESS.check(k, f"friction[{i}]"), REACH_M.check(r, f"friction[{i}]"))
-            for i, (k, r) in enumerate(elements)
-        ]
-        self.values = {}
-
-    def vector(self) -> Floats:
-        """Return count, then stiffness and reach of each element."""
-        return np.concatenate([[float(len(self.elements))], np.ravel(self.elements)])
+    example = {"elements": [{"stiffness": 8e5, "reach": 2e-6}, {"stiffness": 4e5, "reach": 7e-6}]}
 
     def initial_state(self) -> Floats:
         """Return the elements' deflections, all relaxed."""
@@ -69,18 +57,3 @@ class MaxwellSlip(Effect):
     def level(self) -> float:
         """Force with every element yielded (N)."""
         return float(sum(k * r for k, r in self.elements))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the bank in long form; a stage file writes the plain list of elements."""
-        return {"name": self.name, "elements": [{"stiffness": k, "reach": r} for k, r in self.elements]}
-
-    @classmethod
-    def from_dict(cls, entry: Mapping[str, Any]) -> MaxwellSlip:
-        """Build from ``{elements: [{stiffness, reach}, ...]}``."""
-        unknown = set(entry) - {"elements"}
-        if unknown or "elements" not in entry:
-            raise ConfigError(f"maxwell-slip takes 'elements'; found {sorted(entry)}")
-        return cls([(e["stiffness"], e["reach"]) for e in entry["elements"]])
-
-    def __repr__(self) -> str:
-        return f"MaxwellSlip({len(self.elements)} elements, level {self.level:g} N)"

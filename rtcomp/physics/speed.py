@@ -1,5 +1,6 @@
-"""Friction that depends on speed: viscous, micro-damping, Stribeck."""
+"""Friction that depends on speed: viscous, quadratic, micro-damping, Stribeck."""
 
+# ruff: noqa: ARG001 - every kernel takes p, s and w, whatever it needs
 from __future__ import annotations
 
 import math
@@ -30,6 +31,12 @@ def stribeck(p: Floats, s: Floats, w: Floats) -> None:
     w[REACH] *= 1.0 + p[0] * math.exp(-ratio * ratio)
 
 
+@effect_kernel
+def quadratic_drag(p: Floats, s: Floats, w: Floats) -> None:
+    """p: coefficient (N s^2/m^2)."""
+    w[FRICTION] += p[0] * abs(w[VELOCITY]) * w[VELOCITY]
+
+
 @register
 class ViscousFriction(Effect):
     """Friction in proportion to speed."""
@@ -43,10 +50,33 @@ class ViscousFriction(Effect):
     source = "Newton's law of viscosity; Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7)"
     signature = "residual force in proportion to speed, odd in it, alike in both directions"
     experiment = "constant speeds, spaced logarithmically, in both directions"
+    example = {"coefficient": 8.0}
+    neutral = {"coefficient": 0.0}
 
     def damping(self) -> float:
         """Return the coefficient (N s/m)."""
         return abs(self.values["coefficient"])
+
+
+@register
+class QuadraticDrag(Effect):
+    """Friction in proportion to speed squared."""
+
+    name = "quadratic-drag"
+    place = Place.FRICTION
+    parameters = (Parameter("coefficient", "N s^2/m^2", -1e9, 1e9, "force per speed squared"),)
+    kernel = quadratic_drag
+    says = "friction in proportion to speed squared: air, churned lubricant"
+    equation = "F = c |v| v"
+    source = "Rayleigh (1876), Philosophical Magazine 2(13), drag in proportion to speed squared"
+    signature = "residual force that grows with the square of speed, odd in it"
+    experiment = "constant speeds, spaced logarithmically up to the fastest, in both directions"
+    example = {"coefficient": 400.0}
+    neutral = {"coefficient": 0.0}
+
+    def damping(self) -> float:
+        """Return the slope of the force at 1 m/s (1 rad/s) (N s/m)."""
+        return 2.0 * abs(self.values["coefficient"])
 
 
 @register
@@ -65,6 +95,8 @@ class MicroDamping(Effect):
     source = "Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE TAC 40(3), speed-dependent sigma_1"
     signature = "force in proportion to speed at the lowest speeds only"
     experiment = "small fast oscillations inside presliding"
+    example = {"coefficient": 250.0, "speed": 5e-3}
+    neutral = {"coefficient": 0.0}
 
     def damping(self) -> float:
         """Return the coefficient (N s/m)."""
@@ -87,4 +119,6 @@ class Stribeck(Effect):
     source = "Stribeck (1902); Al-Bender, Lampaert, Swevers (2005), IEEE TAC 50(11), eq. for s(v)"
     signature = "residual peaks at break-away and at low speed, same sign as the motion"
     experiment = "slow constant speeds around the Stribeck speed, and starts from rest"
+    example = {"rise": 0.3, "velocity": 2e-3}
+    neutral = {"rise": 0.0}
     order = 20

@@ -1,0 +1,186 @@
+"""A stage simulated: the chain of effects integrated in time, open loop, command held between calls.
+
+Leapfrog with velocity-dependent forces at a predicted velocity: second order, and stop elements are
+integrated exactly over each displacement, so stiffness bounds only the resolution of oscillations. The step
+is chosen from the chain's largest stiffness K and damping C: h <= 0.05 sqrt(m / K) and h <= 0.1 m / C.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rtcomp.kernels import Floats, call_effect, compiled
+from rtcomp.physics import Effect, Place, wires
+from rtcomp.physics.wires import (
+    ACCELERATION,
+    DRIVE,
+    FRICTION,
+    GAIN,
+    MASS,
+    MOVED,
+    NOISE,
+    POSITION,
+    PUSH,
+    REACH,
+    SCALE,
+    SENSED,
+    STEP,
+    TIME,
+    VELOCITY,
+    VOLTS,
+)  # fmt: skip
+from rtcomp.stage.stage import Stage
+
+_COUNT, _DRIVES, _LINKS = 0, 1, 2
+"""Places in a program: number of effects, how many of them (the first) are the drive's, then for each
+effect its kernel's address and where its parameters and state begin."""
+
+
+class Program:
+    """Part of a chain ready to run: addresses of kernels, all parameters, all states."""
+
+    def __init__(self, chain: list[Effect]) -> None:
+        drives = sum(1 for e in chain if e.place is Place.DRIVE)
+        vectors = [e.vector() for e in chain]
+        states = [e.initial_state() for e in chain]
+        links: list[int] = []
+        at_p = at_s = 0
+        for effect, p, s in zip(chain, vectors, states, strict=True):
+            links += [effect.kernel.address, at_p, at_s]
+            at_p, at_s = at_p + p.size, at_s + s.size
+        self.steps = np.array([len(chain), drives, *links], dtype=np.int64)
+        self.p: Floats = np.concatenate([*vectors, np.zeros(1)])
+        self.s: Floats = np.concatenate([*states, np.zeros(1)])
+
+
+@compiled
+def run_chain(steps: np.ndarray, p: Floats, s: Floats, w: Floats, first: int, last: int) -> None:
+    """Run effects `first` to `last` (not included) of a program on the wires."""
+    for j in range(first, last):
+        at = _LINKS + 3 * j
+        call_effect(
+            steps[at], p.ctypes.data + 8 * steps[at + 1], s.ctypes.data + 8 * steps[at + 2], w.ctypes.data
+        )
+
+
+@compiled
+def _integrate(
+    steps: np.ndarray, p: Floats, s: Floats, w: Floats, base: Floats, volts: float, seconds: float, count: int
+) -> None:
+    """Advance by `count` steps of together `seconds`. base: mass (kg), force constant (N/V)."""
+    h = seconds / count
+    effects, drives = steps[_COUNT], steps[_DRIVES]
+    # The new command acts from the first instant: exchange the drive's share of the acceleration.
+    before = w[DRIVE]
+    w[STEP] = 0.0
+    w[VOLTS] = volts
+    w[GAIN] = base[1]
+    w[DRIVE] = 0.0
+    run_chain(steps, p, s, w, 0, drives)
+    a = w[ACCELERATION] + (w[DRIVE] - before) / w[MASS]
+    w[STEP] = h
+    x, v = w[POSITION], w[VELOCITY]
+    for _ in range(count):
+        half = v + 0.5 * h * a
+        w[MOVED] = h * half
+        x += h * half
+        w[TIME] += h
+        w[POSITION] = x
+        w[VELOCITY] = half + 0.5 * h * a  # predicted; corrected below
+        w[ACCELERATION] = a
+        w[VOLTS] = volts
+        w[GAIN] = base[1]
+        w[MASS] = base[0]
+        w[DRIVE] = w[PUSH] = w[FRICTION] = 0.0
+        w[REACH] = w[SCALE] = 1.0
+        run_chain(steps, p, s, w, 0, effects)
+        a = (w[DRIVE] + w[PUSH] - w[FRICTION]) / w[MASS]
+        v = half + 0.5 * h * a
+    w[VELOCITY] = v
+    w[ACCELERATION] = a
+
+
+class Simulator:
+    """A stage in motion. Starts at rest at position 0, friction relaxed.
+
+    `substeps` multiplies the number of integration steps (to check that they suffice).
+    """
+
+    def __init__(self, stage: Stage, seed: int = 0, substeps: float = 1.0) -> None:
+        self.stage = stage
+        moving = [e for e in stage.chain if e.place is not Place.SENSOR]
+        self._moving, self._moving_start = Program(moving), Program(moving)
+        sensing = [e for e in stage.chain if e.place is Place.SENSOR]
+        self._sensing, self._sensing_start = Program(sensing), Program(sensing)
+        self._base = np.array([stage.mass, stage.force_constant])
+        self.step = largest_step(stage) / substeps
+        self._seed = seed
+        self.reset()
+
+    def reset(self) -> None:
+        """Put everything back to the start, the noise too."""
+        self._moving.s[:] = self._moving_start.s
+        self._sensing.s[:] = self._sensing_start.s
+        self._w: Floats = np.zeros(wires.COUNT)
+        self._w[MASS] = self.stage.mass
+        self._w[REACH] = self._w[SCALE] = 1.0
+        self._random = np.random.default_rng(self._seed)
+        self._noise = self._random.standard_normal(4096)
+        self._drawn = 0
+
+    def advance(self, volts: float, seconds: float) -> None:
+        """Integrate over `seconds` with the command `volts` (V) held."""
+        count = max(1, math.ceil(seconds / self.step - 1e-9))
+        m = self._moving
+        _integrate(m.steps, m.p, m.s, self._w, self._base, volts, seconds, count)
+
+    def measure(self) -> float:
+        """Return the position (m) as the sensor sees it now; each call is a new measurement."""
+        w, program = self._w, self._sensing
+        if self._drawn == self._noise.size:
+            self._random.standard_normal(out=self._noise)
+            self._drawn = 0
+        w[NOISE] = self._noise[self._drawn]
+        self._drawn += 1
+        w[SENSED] = w[POSITION]
+        _sense(program.steps, program.p, program.s, w)
+        return float(w[SENSED])
+
+    @property
+    def position(self) -> float:
+        """True position (m)."""
+        return float(self._w[POSITION])
+
+    @property
+    def velocity(self) -> float:
+        """True velocity (m/s)."""
+        return float(self._w[VELOCITY])
+
+    @property
+    def friction(self) -> float:
+        """Friction at the last step (N), opposing motion."""
+        return float(self._w[FRICTION])
+
+    @property
+    def time(self) -> float:
+        """Simulated time (s)."""
+        return float(self._w[TIME])
+
+
+@compiled
+def _sense(steps: np.ndarray, p: Floats, s: Floats, w: Floats) -> None:
+    run_chain(steps, p, s, w, 0, steps[_COUNT])
+
+
+def largest_step(stage: Stage) -> float:
+    """Return the longest integration step (s) that resolves the stage's stiffness and damping."""
+    stiffness = sum(e.stiffness() for e in stage.chain)
+    damping = sum(e.damping() for e in stage.chain)
+    step = 1.0 / stage.rate
+    if stiffness > 0:
+        step = min(step, 0.05 * math.sqrt(stage.mass / stiffness))
+    if damping > 0:
+        step = min(step, 0.1 * stage.mass / damping)
+    return step
