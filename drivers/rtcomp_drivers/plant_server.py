@@ -1,0 +1,276 @@
+"""A stage in a process of its own, in real time, behind a pseudo-terminal: it stands in for hardware.
+
+    python -m rtcomp_drivers.plant_server --config STAGE.yaml --serial
+
+prints the port to give to the driver ``serial`` and runs until SIGINT or SIGTERM. The stage moves by the
+server's monotonic clock whether a host talks to it or not; the board in front of it (rtcomp_drivers.board)
+has the states and the watchdog that a real one has.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import json
+import os
+import select
+import signal
+import sys
+import time
+import tty
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from rtcomp.errors import ConfigError, DeviceError, RtcompError
+from rtcomp.stage.simulate import Simulator
+from rtcomp.stage.stage import Stage
+from rtcomp_drivers.board import Board, BoardFacts
+
+_SLICE_S = 1e-3
+"""s, longest wait for a frame before the plant is moved on."""
+_LAGGING_S = 5e-3
+"""s behind real time from which samples say so."""
+_MOST_BEHIND_S = 1.0
+"""s behind real time at which the plant stops catching up (a suspended or stopped process)."""
+_BUSY = 0.9
+"""Share of real time spent simulating from which the simulation cannot keep up."""
+_PRIORITY = 60
+_MOST = 4096
+
+
+@dataclass
+class Keeping:
+    """How well the simulation keeps up with real time."""
+
+    max_step_lag_s: float = 0.0
+    """s, worst distance of the plant behind real time when a piece of simulation ended."""
+    lost_s: float = 0.0
+    """s of real time that were skipped rather than caught up."""
+    seconds_too_slow: int = 0
+    _begin: float = 0.0
+    _busy: float = field(default=0.0, repr=False)
+
+    def count(self, began: float, ended: float) -> bool:
+        """Count one piece of simulation; return True once when it is first found too slow."""
+        self._busy += ended - began
+        if ended - self._begin < 1.0:
+            return False
+        too_slow = self._busy > _BUSY * (ended - self._begin)
+        self._begin, self._busy = ended, 0.0
+        self.seconds_too_slow += too_slow
+        return too_slow and self.seconds_too_slow == 1
+
+
+class PlantServer:
+    """The board and its stage behind a pseudo-terminal. Build it, tell `port` to the host, `run` it."""
+
+    def __init__(self, stage: Stage, seed: int = 0, text: str = "rtcomp plant server") -> None:
+        simulator = Simulator(stage, seed=seed)
+        simulator.advance(0.0, 1.0 / stage.rate)  # compiles, which takes seconds, before anybody waits
+        simulator.measure()
+        simulator.reset()
+        facts = BoardFacts(axis=stage.axis, voltage_limit=stage.voltage_limit, text=text)
+        self.board = Board(simulator, facts)
+        self.keeping = Keeping()
+        self.unsent = 0
+        """Bytes that no host read."""
+        self._stopped = False
+        try:
+            self._master, self._slave = os.openpty()
+        except OSError as error:
+            raise DeviceError(
+                f"no pseudo-terminal to be had ({error.strerror}); are too many open?"
+            ) from error
+        # Held open here too: with no host on it, the master would otherwise read end-of-file for ever.
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.port = os.ttyname(self._slave)
+        """Path of the port for the host."""
+        self.started = time.monotonic()
+
+    def stop(self) -> None:
+        """End `run` within a millisecond; may be called from a signal handler."""
+        self._stopped = True
+
+    def run(self) -> None:
+        """Serve until `stop`; then zero the output and let go of the port."""
+        board, keeping, master = self.board, self.keeping, self._master
+        clock, wait, read = time.monotonic, select.select, os.read
+        self.started = clock() - board.time
+        keeping._begin = clock()
+        try:
+            while not self._stopped:
+                ready = wait([master], [], [], _SLICE_S)[0]
+                arrived = clock()
+                if arrived - self.started - board.time > _MOST_BEHIND_S:
+                    self._skip(arrived)
+                data = read(master, _MOST) if ready else b""
+                now = arrived - self.started
+                answer = board.receive(data, now) if data else board.run_until(now)
+                if answer:
+                    self._send(answer)
+                ended = clock()
+                lag = ended - self.started - board.time
+                if lag > keeping.max_step_lag_s:
+                    keeping.max_step_lag_s = lag
+                board.lagging = lag > _LAGGING_S
+                if keeping.count(arrived, ended):
+                    self._say_too_slow()
+        finally:
+            board.shut_down(max(board.time, min(clock() - self.started, board.time + _SLICE_S)))
+            os.close(self._master)
+            os.close(self._slave)
+
+    def _send(self, answer: bytes) -> None:
+        try:
+            sent = os.write(self._master, answer)
+        except BlockingIOError:
+            sent = 0
+        self.unsent += len(answer) - sent
+
+    def _skip(self, now: float) -> None:
+        """Trip what has to trip, then go on from here: no simulating through hours of suspension."""
+        answer = self.board.run_until(self.board.time + _MOST_BEHIND_S)
+        if answer:
+            self._send(answer)
+        gap = now - self.started - self.board.time
+        self.started += gap
+        self.keeping.lost_s += gap
+
+    def _say_too_slow(self) -> None:
+        print(
+            f"plant server: the simulation cannot keep up with real time (over {100 * _BUSY:.0f} % of a "
+            "second went into it); soften the stage's stiffest element, or use a faster machine",
+            file=sys.stderr,
+            flush=True,
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """Return what happened, for the log; times in s on the board's clock."""
+        board, keeping = self.board, self.keeping
+        return {
+            "port": self.port,
+            "started_monotonic_s": self.started,
+            "seconds": board.time,
+            "frames": board.decoder.good,
+            "bad_frames": board.decoder.bad,
+            "unknown_frames": board.decoder.unknown,
+            **board.counters,
+            "unsent_bytes": self.unsent,
+            "zeroings": [z._asdict() for z in board.zeroings],
+            "max_step_lag_s": keeping.max_step_lag_s,
+            "lost_s": keeping.lost_s,
+            "seconds_too_slow": keeping.seconds_too_slow,
+            "scheduling": _scheduling(),
+        }
+
+
+def serve(
+    stage: Stage,
+    *,
+    link: str = "serial",
+    seed: int = 0,
+    as_json: bool = False,
+    log: Path | None = None,
+    realtime: bool = True,
+) -> dict[str, Any]:
+    """Run `stage` behind a port until SIGINT or SIGTERM; return the summary that is also written.
+
+    Prints one line with the port on stdout (`as_json`: an object), at exit a JSON summary on stderr, or to
+    the file `log`. With `realtime` the process runs under SCHED_FIFO where that is allowed; what is in
+    force stands in the line and in the summary. Raises ConfigError for a link that it does not speak and
+    DeviceError where the port cannot be had. Call it from the main thread: it sets signal handlers.
+    """
+    if link != "serial":
+        raise ConfigError(f"plant server: unknown link {link!r}; it serves 'serial'")
+    server = PlantServer(stage, seed=seed)
+
+    def end(_signal: int, _frame: FrameType | None) -> None:
+        server.stop()
+
+    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
+    scheduling = _begin_realtime() if realtime else None
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    try:
+        if as_json:
+            ready = {"port": server.port, "link": link, "pid": os.getpid(), "scheduling": _scheduling()}
+            line = json.dumps(ready)
+        else:
+            line = f"port: {server.port}"
+        print(line, flush=True)
+        server.run()
+    finally:
+        gc.enable()
+        gc.unfreeze()
+        if scheduling is not None:
+            summary = server.summary()  # before the scheduling goes back
+            os.sched_setscheduler(0, scheduling[0], scheduling[1])
+        else:
+            summary = server.summary()
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        _write(summary, log)
+    return summary
+
+
+def _write(summary: dict[str, Any], log: Path | None) -> None:
+    text = json.dumps(summary, allow_nan=False)
+    if log is None:
+        print(text, file=sys.stderr, flush=True)
+    else:
+        log.write_text(text + "\n")
+
+
+def _begin_realtime() -> tuple[int, os.sched_param] | None:
+    """Ask for SCHED_FIFO; return what was in force before, or None where it is not allowed or not there."""
+    try:
+        before = (os.sched_getscheduler(0), os.sched_getparam(0))
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(_PRIORITY))
+    except (OSError, AttributeError):  # no right to it, or not Linux; said in the ready line and the summary
+        return None
+    return before
+
+
+def _scheduling() -> str:
+    """Return the scheduling class that is really in force."""
+    try:
+        policy = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
+        priority = os.sched_getparam(0).sched_priority
+    except (OSError, AttributeError):
+        return "unknown"
+    return f"SCHED_FIFO {priority}" if policy == os.SCHED_FIFO else "SCHED_OTHER"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the plant server from the command line; return the exit status."""
+    says = (__doc__ or "").split("\n")[0]
+    parser = argparse.ArgumentParser(prog="python -m rtcomp_drivers.plant_server", description=says)
+    parser.add_argument("--config", type=Path, required=True, help="stage file or run configuration")
+    parser.add_argument(
+        "--serial", action="store_true", help="speak the serial protocol, the only link there is"
+    )
+    parser.add_argument("--json", action="store_true", help="print the port as a JSON object")
+    parser.add_argument("--log", type=Path, help="write the summary to this file instead of stderr")
+    parser.add_argument("--seed", type=int, default=0, help="of the sensor's noise")
+    parser.add_argument("--no-realtime", action="store_true", help="do not ask for SCHED_FIFO")
+    options = parser.parse_args(arguments)
+    try:
+        serve(
+            Stage.load(options.config),
+            seed=options.seed,
+            as_json=options.json,
+            log=options.log,
+            realtime=not options.no_realtime,
+        )
+    except RtcompError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return error.exit_status
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
