@@ -17,7 +17,6 @@ after it, on forces::
 Phases follow one rule everywhere: sin(2 pi x / period + phase).
 """
 
-# ruff: noqa: ARG001 - every kernel takes p, s and w, whatever it needs
 from __future__ import annotations
 
 import math

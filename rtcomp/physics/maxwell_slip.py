@@ -36,7 +36,7 @@ class MaxwellSlip(ListEffect):
     parameters = ()
     element = (STIFFNESS, REACH_M)
     kernel = maxwell_slip
-    says = "presliding hysteresis of parallel spring and slider elements; a yielded element pushes stiffness * reach"
+    says = "presliding hysteresis of springs and sliders in parallel; yielded, one pushes stiffness * reach"
     equation = "F = sum k_i z_i,  z_i <- clip(z_i + dx, -r_i, r_i)"
     source = "Iwan (1966), J. Applied Mechanics 33(4); Lampaert, Swevers, Al-Bender (2002), IEEE TAC 47(4)"
     signature = (

@@ -8,7 +8,6 @@ Orders, lowest first::
     80  sensor-resolution      SENSED to the nearest count
 """
 
-# ruff: noqa: ARG001 - every kernel takes p, s and w, whatever it needs
 from __future__ import annotations
 
 import math
@@ -101,7 +100,7 @@ class SensorPeriodicError(Effect):
         "the reading errs periodically: cyclic error of an interferometer, sub-divisional error of an encoder"
     )
     equation = "y = x + a sin(2 pi x / period)"
-    source = "Wu, Deslattes (1998), Review of Scientific Instruments 69(7), periodic nonlinearity"
+    source = "Wu, Deslattes (1998), Applied Optics 37(28), periodic nonlinearity"
     signature = "apparent acceleration, periodic in position, that grows with the square of speed"
     experiment = "the same stretch slowly and fast"
     example = {"amplitude": 5e-6, "period": 2e-4}
@@ -119,7 +118,7 @@ class SensorNoise(Effect):
     kernel = sensor_noise
     says = "each reading errs at random, independently of the last"
     equation = "y = x + rms * n, n standard normal"
-    source = "IEEE Std 1139 on white noise; any sensor's data sheet"
+    source = "Bendat, Piersol (2010), Random Data, white noise"
     signature = "a flat spectrum of the reading at rest"
     experiment = "holding still, drive off"
     example = {"rms": 1e-5}

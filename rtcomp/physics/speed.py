@@ -1,6 +1,5 @@
 """Friction that depends on speed: viscous, quadratic, micro-damping, Stribeck."""
 
-# ruff: noqa: ARG001 - every kernel takes p, s and w, whatever it needs
 from __future__ import annotations
 
 import math

@@ -1,0 +1,61 @@
+"""Dahl friction: the stress-strain curve of a solid, taken to sliding."""
+
+from __future__ import annotations
+
+import math
+
+from rtcomp.kernels import Floats, effect_kernel
+from rtcomp.physics.catalogue import register
+from rtcomp.physics.effect import Effect, Parameter, Place
+from rtcomp.physics.wires import FRICTION, MOVED, REACH, SCALE
+
+
+@effect_kernel
+def dahl(p: Floats, s: Floats, w: Floats) -> None:
+    """p: stiffness, coulomb, exponent i; s: force (N).
+
+    In u = 1 - F sgn(v) / Fc the equation is du/d|x| = -(k / Fc) |u|^i sgn(u), which has a closed form for
+    every i; so a displacement of any size is exact.
+    """
+    moved = w[MOVED]
+    if moved != 0.0:
+        level = p[1] * w[REACH]
+        direction = math.copysign(1.0, moved)
+        gap = 1.0 - s[0] * direction / level
+        travel = p[0] / level * abs(moved)
+        size = abs(gap)
+        if p[2] == 1.0:
+            left = size * math.exp(-travel)
+        elif size < 1e-200:  # settled; its powers would leave the range of floats
+            left = 0.0
+        else:
+            # Relative to the starting gap, so that no power of a tiny gap overflows.
+            shrink = 1.0 - (1.0 - p[2]) * travel * math.exp((p[2] - 1.0) * math.log(size))
+            left = size * math.exp(math.log(shrink) / (1.0 - p[2])) if shrink > 0.0 else 0.0
+        s[0] = direction * level * (1.0 - math.copysign(left, gap))
+    w[FRICTION] += s[0] * w[SCALE]
+
+
+@register
+class Dahl(Effect):
+    """Rate-independent friction with one state and one level."""
+
+    name = "dahl"
+    place = Place.FRICTION
+    parameters = (
+        Parameter("stiffness", "N/m", 0.0, 1e12, "slope of the force at zero force", open_low=True),
+        Parameter("coulomb", "N", 0.0, 1e6, "level of sliding", open_low=True),
+        Parameter("exponent", "1", 0.0, 10.0, "shape: 0 brittle, 1 exponential, more is ductile", 1.0),
+    )
+    kernel = dahl
+    states = 1
+    says = "friction whose slope against displacement falls as it nears its level; the same at every speed"
+    equation = "dF/dx = k |1 - F/Fc sgn(v)|^i sgn(1 - F/Fc sgn(v))"
+    source = "Dahl (1968), A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1"
+    signature = "one curved branch after every reversal, the same at every speed, with no rise before sliding"
+    experiment = "reversals inside and beyond presliding at two very different speeds"
+    example = {"stiffness": 1e6, "coulomb": 3.0, "exponent": 1.5}
+
+    def stiffness(self) -> float:
+        """Return the slope just after a reversal out of sliding, 2^i k (N/m)."""
+        return float(2.0 ** self.values["exponent"] * self.values["stiffness"])

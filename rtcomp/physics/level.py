@@ -1,0 +1,28 @@
+"""The level at which sliding friction settles, against speed: Coulomb, static and the fall between them."""
+
+from __future__ import annotations
+
+import math
+
+from rtcomp.kernels import compiled
+from rtcomp.physics.effect import Parameter
+
+COULOMB = Parameter("coulomb", "N", 0.0, 1e6, "friction of fast sliding, without viscous part", open_low=True)
+STATIC = Parameter("static", "N", 0.0, 1e6, "friction at the limit of low speed", open_low=True)
+STRIBECK_VELOCITY = Parameter(
+    "stribeck_velocity", "m/s", 0.0, 1e3, "speed at which the rise to static has fallen to 1/e", 1e-3, True
+)
+EXPONENT = Parameter(
+    "exponent", "1", 0.0, 10.0, "how sharply the level falls around the Stribeck velocity", 2.0, True
+)
+VISCOUS = Parameter("viscous", "N s/m", 0.0, 1e6, "friction in proportion to speed", 0.0)
+
+LEVEL = (COULOMB, STATIC, STRIBECK_VELOCITY, EXPONENT)
+
+
+@compiled
+def stribeck_level(coulomb: float, static: float, velocity: float, exponent: float, v: float) -> float:
+    """Return s(v) = coulomb + (static - coulomb) exp(-|v / velocity|^exponent), always positive."""
+    ratio = abs(v) / velocity
+    power = ratio * ratio if exponent == 2.0 else ratio**exponent
+    return coulomb + (static - coulomb) * math.exp(-power)

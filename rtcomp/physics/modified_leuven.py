@@ -1,0 +1,122 @@
+"""Modified Leuven friction: a Maxwell-slip bank driven by a state that stops growing as sliding begins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats, effect_kernel
+from rtcomp.physics.approach import LONGEST, SHARPNESS, STEPS, advance, flow
+from rtcomp.physics.catalogue import register
+from rtcomp.physics.effect import Parameter, Place
+from rtcomp.physics.level import LEVEL, VISCOUS, stribeck_level
+from rtcomp.physics.lists import ListEffect
+from rtcomp.physics.wires import FRICTION, MOVED, REACH, SCALE, VELOCITY
+
+DAMPING = Parameter("damping", "N s/m", 0.0, 1e8, "damping sigma_1 of the presliding state", 0.0)
+
+
+@effect_kernel
+def modified_leuven(p: Floats, s: Floats, w: Floats) -> None:
+    """p: coulomb, static, Stribeck velocity, exponent, sharpness, damping, viscous, count, then elements.
+
+    Elements are stiffness and reach each; s: deflection (m) of each. Within a step the motion is cut where
+    the force would change by more than a tenth of the level, so a long step is as right as many short ones.
+    """
+    v = w[VELOCITY]
+    n = p[4]
+    count = int(p[7])
+    widen = w[REACH]
+    level = stribeck_level(p[0], p[1], p[2], p[3], v) * widen
+    left = abs(w[MOVED])
+    direction = math.copysign(1.0, w[MOVED])
+    steps = 0
+    while left > 0.0:
+        along = 0.0
+        loaded = (
+            0.0  # stiffness that still takes load forward, and backward (when the level has fallen below)
+        )
+        unloading = 0.0
+        for i in range(count):
+            deflection = direction * s[i]
+            along += p[8 + 2 * i] * deflection
+            reach = p[9 + 2 * i] * widen
+            if deflection < reach:
+                loaded += p[8 + 2 * i]
+            if deflection > -reach:
+                unloading += p[8 + 2 * i]
+        q = along / level
+        stiffness = loaded if q < 1.0 else unloading
+        if abs(q - 1.0) < 1e-15 or stiffness == 0.0:
+            break
+        h = left * stiffness / level
+        steps += 1
+        if h > LONGEST and steps < STEPS:
+            h = LONGEST
+            left -= h * level / stiffness
+        else:
+            left = 0.0
+        z = direction * (advance(q, n, h) - q) * level / stiffness
+        for i in range(count):
+            reach = p[9 + 2 * i] * widen
+            s[i] = min(max(s[i] + z, -reach), reach)
+    force = 0.0
+    for i in range(count):
+        reach = p[9 + 2 * i] * widen
+        s[i] = min(max(s[i], -reach), reach)
+        force += p[8 + 2 * i] * s[i]
+    rate = v * flow(math.copysign(1.0, v) * force / level, n)
+    w[FRICTION] += (force + p[5] * rate) * w[SCALE] + p[6] * v
+
+
+@register
+class ModifiedLeuven(ListEffect):
+    """The Leuven model without its stack; `elements` is a list of {stiffness, reach}."""
+
+    name = "modified-leuven"
+    place = Place.FRICTION
+    parameters = (*LEVEL, SHARPNESS, DAMPING, VISCOUS)
+    element = (
+        Parameter("stiffness", "N/m", 0.0, 1e12, "spring of the element", open_low=True),
+        Parameter("reach", "m", 0.0, 1e3, "deflection at which the element yields", open_low=True),
+    )
+    kernel = modified_leuven
+    says = "a Maxwell-slip bank in a state z that follows the motion and comes to rest in sliding"
+    equation = (
+        "dz/dt = v (1 - sgn(F_h / s) |F_h / s|^n), F_h a Maxwell-slip bank in z, s signed by v; "
+        "F = F_h + sigma_1 dz/dt + sigma_2 v"
+    )
+    source = "Lampaert, Swevers, Al-Bender (2002), IEEE TAC 47(4)"
+    signature = "presliding loops with non-local memory that pass smoothly into sliding, falling with speed"
+    experiment = "nested presliding reversals, then constant speeds around the Stribeck velocity"
+    example = {
+        "coulomb": 3.0, "static": 4.0, "stribeck_velocity": 2e-3, "exponent": 2.0, "sharpness": 3.0,
+        "damping": 200.0, "viscous": 5.0,
+        "elements": [{"stiffness": 8e5, "reach": 2e-6}, {"stiffness": 4e5, "reach": 7e-6}],
+    }  # fmt: skip
+
+    def __init__(self, elements: Sequence[Any] = (), **values: float) -> None:
+        super().__init__(elements, **values)
+        bank = sum(k * r for k, r in self.elements)
+        highest = max(self.values["coulomb"], self.values["static"])
+        if bank < highest * (1.0 - 1e-9):
+            raise ConfigError(
+                f"modified-leuven: its elements yield at {bank:g} N, below the level of {highest:g} N; "
+                f"sum of stiffness * reach must be at least {highest:g} N"
+            )
+
+    def initial_state(self) -> Floats:
+        """Return the elements' deflections, all relaxed."""
+        return np.zeros(len(self.elements))
+
+    def stiffness(self) -> float:
+        """Return twice the bank's stiffness, reached just after a reversal out of sliding (N/m)."""
+        return 2.0 * float(sum(k for k, _ in self.elements))
+
+    def damping(self) -> float:
+        """Return twice sigma_1, reached like the stiffness, and sigma_2 (N s/m)."""
+        return 2.0 * self.values["damping"] + self.values["viscous"]

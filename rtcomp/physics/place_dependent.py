@@ -1,0 +1,44 @@
+"""Friction whose level depends on position."""
+
+from __future__ import annotations
+
+import math
+
+from rtcomp.kernels import Floats, effect_kernel
+from rtcomp.physics.catalogue import register
+from rtcomp.physics.drive import PERIOD, PHASE
+from rtcomp.physics.effect import Effect, Parameter, Place
+from rtcomp.physics.wires import POSITION, SCALE
+
+
+@effect_kernel
+def position_dependent_friction(p: Floats, s: Floats, w: Floats) -> None:
+    """p: amplitude (1), period (m), phase (rad), slope (1/m)."""
+    x = w[POSITION]
+    factor = 1.0 + p[0] * math.sin(2.0 * math.pi * x / p[1] + p[2]) + p[3] * x
+    w[SCALE] *= max(factor, 0.0)  # friction never drives
+
+
+@register
+class PositionDependentFriction(Effect):
+    """Friction level varies along the stroke."""
+
+    name = "position-dependent-friction"
+    place = Place.FRICTION
+    parameters = (
+        Parameter("amplitude", "1", -1.0, 1.0, "relative size of the periodic part"),
+        PERIOD,
+        PHASE,
+        Parameter("slope", "1/m", -1e6, 1e6, "relative growth along the stroke", 0.0),
+    )
+    kernel = position_dependent_friction
+    says = "friction is higher in some places than in others: preload, wear, dirt"
+    equation = "F <- F (1 + a sin(2 pi x / period + phase) + slope x)"
+    source = (
+        "Popovic, Goldenberg (1998), IEEE Trans. Robotics and Automation 14(1), spectral friction in position"
+    )
+    signature = "residual force that depends on position and changes its sign with the direction of motion"
+    experiment = "slow strokes over the whole travel in both directions"
+    example = {"amplitude": 0.3, "period": 7e-4, "phase": 0.5, "slope": 150.0}
+    neutral = {"amplitude": 0.0, "slope": 0.0}
+    order = 20

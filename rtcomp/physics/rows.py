@@ -1,0 +1,50 @@
+"""Run a chain of effects over rows of wires: over a recording, a reference, a test's motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from rtcomp.kernels import Floats, call_effect, compiled
+from rtcomp.physics.effect import Effect
+from rtcomp.physics.wires import COUNT, GAIN, MASS, REACH, SCALE
+
+
+@compiled
+def _over_rows(
+    addresses: npt.NDArray[np.intp], parts: npt.NDArray[np.intp], p: Floats, s: Floats, rows: Floats
+) -> None:
+    for k in range(rows.shape[0]):
+        w = rows[k]
+        for i in range(addresses.shape[0]):
+            call_effect(
+                addresses[i], p[parts[i, 0] :].ctypes.data, s[parts[i, 1] :].ctypes.data, w.ctypes.data
+            )
+
+
+def over_rows(chain: Sequence[Effect], rows: Floats) -> Floats:
+    """Run `chain`, in the order given and from its virgin state, over `rows` in place and return them.
+
+    `rows` has one row a step and one column a wire (shape (n, wires.COUNT), float64, C order), filled with
+    what the effects read; they write into the same rows. Use `new_rows` to make them. Raises TypeError for
+    arrays of another kind.
+    """
+    if rows.dtype != np.float64 or not rows.flags.c_contiguous or rows.ndim != 2 or rows.shape[1] != COUNT:
+        raise TypeError(f"rows must be a C-ordered float64 array of shape (n, {COUNT}); it is {rows.shape}")
+    vectors = [effect.vector() for effect in chain]
+    states = [effect.initial_state() for effect in chain]
+    starts = [np.cumsum([0] + [len(a) for a in arrays])[:-1] for arrays in (vectors, states)]
+    # One spare number each, so that an effect without parameters or state still has an address.
+    p, s = (np.concatenate([*arrays, [0.0]]) for arrays in (vectors, states))
+    addresses = np.array([effect.kernel.address for effect in chain], dtype=np.intp)
+    _over_rows(addresses, np.ascontiguousarray(np.transpose(starts), dtype=np.intp), p, s, rows)
+    return rows
+
+
+def new_rows(count: int) -> Floats:
+    """Return `count` rows of wires in which nothing acts: factors 1, everything else 0."""
+    rows = np.zeros((count, COUNT))
+    rows[:, [REACH, SCALE, MASS, GAIN]] = 1.0
+    return rows
