@@ -19,9 +19,7 @@ def lugre(p: Floats, s: Floats, w: Floats) -> None:
     level = stribeck_level(p[2], p[3], p[4], p[5], v) * w[REACH]
     settled = level / p[0]
     # The solution at constant speed depends on the displacement only: exact for a step of any size.
-    keep = math.exp(-abs(moved) / settled)
-    target = math.copysign(settled, moved)
-    s[0] = target + (s[0] - target) * keep
+    s[0] += (math.copysign(settled, moved) - s[0]) * -math.expm1(-abs(moved) / settled)
     rate = v - abs(v) * s[0] / settled
     w[FRICTION] += (p[0] * s[0] + p[1] * rate) * w[SCALE] + p[6] * v
 

@@ -9,7 +9,21 @@ import numpy.typing as npt
 
 from rtcomp.kernels import Floats, call_effect, compiled
 from rtcomp.physics.effect import Effect
-from rtcomp.physics.wires import COUNT, GAIN, MASS, REACH, SCALE
+from rtcomp.physics.wires import (
+    ACCELERATION,
+    COUNT,
+    GAIN,
+    MASS,
+    MOVED,
+    POSITION,
+    REACH,
+    SCALE,
+    SENSED,
+    STEP,
+    TIME,
+    VELOCITY,
+    VOLTS,
+)  # fmt: skip
 
 
 @compiled
@@ -47,4 +61,21 @@ def new_rows(count: int) -> Floats:
     """Return `count` rows of wires in which nothing acts: factors 1, everything else 0."""
     rows = np.zeros((count, COUNT))
     rows[:, [REACH, SCALE, MASS, GAIN]] = 1.0
+    return rows
+
+
+def motion_rows(position: Floats, step: float, volts: Floats | float = 0.0) -> Floats:
+    """Return rows that follow `position` (m, shape (n,)) from 0, one every `step` seconds, at `volts`.
+
+    Speed is the mean over each step, which is what the displacement says; the mass is 1 kg, the force
+    constant 1 N/V.
+    """
+    rows = new_rows(len(position))
+    rows[:, TIME] = step * np.arange(1, len(position) + 1)
+    rows[:, STEP] = step
+    rows[:, POSITION] = rows[:, SENSED] = position
+    rows[:, MOVED] = np.diff(position, prepend=0.0)
+    rows[:, VELOCITY] = rows[:, MOVED] / step
+    rows[:, ACCELERATION] = np.diff(rows[:, VELOCITY], prepend=0.0) / step
+    rows[:, VOLTS] = volts
     return rows
