@@ -26,7 +26,8 @@ choose() {
             exit 1
         fi
     done
-    echo "setup: no Python 3.11 or newer found (python3 is $(python3 -V 2>&1 || true)); install one, or name it: make PYTHON=/path/to/python3.11" >&2
+    found=$(python3 -V 2>/dev/null || echo none)
+    echo "setup: no Python 3.11 or newer (python3: $found); install one, or name it: make PYTHON=/its/path" >&2
     exit 1
 }
 

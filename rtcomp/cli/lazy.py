@@ -17,11 +17,11 @@ class LazyGroup(click.Group):
         super().__init__(*arguments, **settings)
         self.table = dict(table)
 
-    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+    def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names in the table's order."""
         return list(self.table)
 
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import and return the command, or None where the table has none."""
         if cmd_name not in self.table:
             return None
@@ -40,7 +40,7 @@ class LazyGroup(click.Group):
             raise click.UsageError(f"no command {name!r}; {hint}", ctx)
         return super().resolve_command(ctx, args)
 
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands into the help, from the table."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, says) for name, (_, says) in self.table.items()])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import select
 import sys
 import traceback
 from collections.abc import Sequence
@@ -141,13 +142,17 @@ def _say(message: str, status: int, prefix: str = "error: ") -> int:
 
 
 def _stdout_is_gone() -> bool:
+    """Say whether the reader of standard output has closed it; if so, drop what is still to be written."""
     try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        # The interpreter flushes once more at exit, and would complain.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return True
-    return False
+        descriptor = sys.stdout.fileno()
+    except (OSError, ValueError):  # not a file at all
+        return False
+    poll = select.poll()
+    poll.register(descriptor, 0)
+    gone = any(events & (select.POLLERR | select.POLLHUP) for _, events in poll.poll(0))
+    if gone:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
+    return gone
 
 
 if __name__ == "__main__":
