@@ -115,6 +115,7 @@ class RecordingFile:
             if at < len(time):
                 chosen.append(at)
                 self._next_weights = float(time[at]) + WEIGHTS_PERIOD
+                at += 1
         return chosen
 
     def flush(self) -> None:

@@ -1,0 +1,151 @@
+"""MAT (5 and 7.3) and HDF5 files into a table.
+
+Whatever the nesting, every numeric vector becomes a column by its own name, or by its path
+(``log.motor.position``) where two have the same; single numbers and texts become metadata.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rtcomp.errors import RecordingError
+from rtcomp.recording.table import Floats, Table
+
+
+def read_mat5(path: Path) -> Table:
+    """Read a MATLAB 5 file; raise RecordingError where it is truncated or damaged."""
+    from scipy.io import loadmat
+
+    try:
+        content = loadmat(path, simplify_cells=True)
+    except Exception as error:  # the library meets a cut-off file with a dozen kinds of error
+        raise RecordingError(f"{path}: is truncated or damaged: {_line(error)}") from None
+    return _table({k: v for k, v in content.items() if not k.startswith("__")})
+
+
+def read_hdf5(path: Path) -> Table:
+    """Read an HDF5 file: the program's own (also after a kill, also while being written) or MATLAB 7.3.
+
+    Raises RecordingError where it is truncated or damaged.
+    """
+    import h5py
+
+    try:
+        try:
+            file = h5py.File(path, "r")
+        except OSError as error:
+            if "already open for write" not in str(error):
+                raise
+            file = h5py.File(path, "r", swmr=True)
+        if _ours(file) and not int(file.attrs.get("complete", 0)):
+            file.close()
+            file = h5py.File(path, "r", swmr=True)  # somebody may be writing it
+        with file:
+            if _ours(file):
+                return _own(file)
+            table = _table(_tree(file))
+            table.metadata |= {k: _plain(v) for k, v in file.attrs.items()}
+            return table
+    except (OSError, RuntimeError, KeyError) as error:
+        raise RecordingError(f"{path}: is truncated or damaged: {_line(error)}") from None
+
+
+def _ours(file: Any) -> bool:
+    return str(file.attrs.get("format", "")).startswith("rtcomp recording")
+
+
+def _own(file: Any) -> Table:
+    """Read a recording of the program's own, cut to the rows that all its columns have."""
+    metadata = {key: _plain(value) for key, value in file.attrs.items()}
+    columns = {name: item[()] for name, item in file.items() if getattr(item, "ndim", 0) == 1}
+    notes = []
+    rows = min((len(column) for column in columns.values()), default=0)
+    if not metadata.get("complete"):
+        ended = metadata.get("ended", "no")
+        notes.append(
+            "the recording has no end (still being written, or its recorder was killed): read to its last flush"
+            if ended == "no"
+            else f"the recording did not end as it should ({ended})"
+        )
+    if metadata.get("rows_lost"):
+        notes.append(f"the recorder lost {metadata['rows_lost']} rows")
+    return Table({name: column[:rows] for name, column in columns.items()}, metadata, notes)
+
+
+def _tree(group: Any) -> dict[str, Any]:
+    """Read a group into nested dicts as `loadmat` makes them; MATLAB's own bookkeeping is left out."""
+    import h5py
+
+    tree: dict[str, Any] = {}
+    for name, item in group.items():
+        if name.startswith("#"):
+            continue
+        if isinstance(item, h5py.Group):
+            tree[name] = _tree(item)
+        elif isinstance(item, h5py.Dataset) and item.dtype.kind in "fiub":
+            if item.attrs.get("MATLAB_class") == b"char":
+                tree[name] = "".join(map(chr, np.ravel(item[()])))
+            elif not item.attrs.get("MATLAB_empty", 0):
+                tree[name] = item[()]
+    return tree
+
+
+def _table(tree: Mapping[str, Any]) -> Table:
+    """Flatten nested dicts of arrays."""
+    table = Table({})
+    vectors: dict[str, Floats] = {}
+    for where, value in _leaves(tree, ""):
+        if isinstance(value, str):
+            table.metadata[where] = value
+            continue
+        array = np.squeeze(np.asarray(value))
+        if array.dtype.kind not in "fiub":
+            continue
+        array = array.astype(np.float64)
+        if array.ndim == 0:
+            table.metadata[where] = float(array)
+        elif array.ndim == 1:
+            vectors[where] = array
+        elif array.ndim == 2 and min(array.shape) <= 16:
+            tall = array if array.shape[0] >= array.shape[1] else array.T
+            vectors |= {f"{where}:{i + 1}": np.ascontiguousarray(tall[:, i]) for i in range(tall.shape[1])}
+    last = [where.rsplit(".", 1)[-1] for where in vectors]
+    for where, vector in vectors.items():
+        short = where.rsplit(".", 1)[-1]
+        table.columns[short if last.count(short) == 1 else where] = vector
+    return table
+
+
+def _leaves(tree: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{prefix}{name}.")
+        elif isinstance(value, list):
+            inside = {f"{name}:{i + 1}": item for i, item in enumerate(value)}
+            yield from _leaves(inside, prefix)
+        else:
+            yield f"{prefix}{name}", value
+
+
+def _plain(value: Any) -> Any:
+    """Return an attribute as Python has it: text, numbers, lists; JSON text as what it says."""
+    if isinstance(value, bytes):
+        value = value.decode(errors="replace")
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+        value = value.decode(errors="replace") if isinstance(value, bytes) else value
+    if isinstance(value, str) and value[:1] in ("{", "["):
+        try:
+            return json.loads(value)
+        except ValueError:
+            return value
+    return value
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())[:200] or type(error).__name__
