@@ -33,7 +33,7 @@ rate: 1000.0
 
 class Element(Section):
     stiffness: float
-    reach: float = Field(gt=0, le=1, json_schema_extra={"unit": "m"})
+    reach: float = Field(gt=0, le=1, description="m")
 
 
 class LuGre(Section):
@@ -48,8 +48,8 @@ class Gms(Section):
 
 class Stage(Section):
     axis: Literal["linear", "rotary"] = "linear"
-    mass: float = Field(gt=0, json_schema_extra={"unit": "kg"})
-    viscous: float = Field(0.0, ge=0, le=1e6, json_schema_extra={"unit": "N s/m"})
+    mass: float = Field(gt=0, description="kg")
+    viscous: float = Field(0.0, ge=0, le=1e6, description="N s/m")
     friction: (
         Annotated[list[Element], Field(min_length=1)]
         | Annotated[LuGre | Gms, Field(discriminator="model")]
@@ -251,7 +251,7 @@ def test_a_section_alone_is_checked_under_its_full_name() -> None:
     file = parse_yaml(EXAMPLE.replace("mass: 2.0 ", "mass: -2.0"), "run.yaml")
     assert validate(Sensor, file, ("sensor",)).noise == 15e-9
     assert validate(Element, file, ("stage", "friction", 1)).reach == 1e-6
-    with pytest.raises(ConfigError, match=r"^run.yaml:3: stage.mass is -2; allowed is more than 0 kg$"):
+    with pytest.raises(ConfigError, match=r"^run.yaml:3: stage.mass is -2; allowed is more than 0 \(kg\)$"):
         validate(Stage, file, ("stage",))
     with pytest.raises(ConfigError, match=r"^run.yaml:1: controller: is missing$"):
         validate(Sensor, file, ("controller",))
@@ -276,7 +276,7 @@ def test_a_section_alone_is_checked_under_its_full_name() -> None:
             "stage: {mass: 1, friction: [{stiffness: 1, rech: 1}]}",
             "run.yaml:1: unknown key stage.friction[0].rech; did you",
         ),
-        ("rate: 1\nstage:\n  axis: linear", "run.yaml:2: stage.mass (kg) is missing"),
+        ("rate: 1\nstage:\n  axis: linear", "run.yaml:2: stage.mass is missing (kg)"),
         ("rate: 1", "run.yaml:1: stage is missing"),
         ("stage: {mass: heavy}", "run.yaml:1: stage.mass is 'heavy'; it must be a number (kg)"),
         ("stage: {mass: '1.0'}", "run.yaml:1: stage.mass is '1.0'; it must be a number (kg)"),
@@ -287,15 +287,18 @@ def test_a_section_alone_is_checked_under_its_full_name() -> None:
         ("stage: {mass: -.inf}", "run.yaml:1: stage.mass is -inf; it must be a finite number"),
         ("stage: {mass: 1e999}", "run.yaml:1: stage.mass is inf; it must be a finite number"),
         ("stage: {mass: nan}", "run.yaml:1: stage.mass is 'nan'; it must be a number (kg)"),
-        ("stage: {mass: 0}", "run.yaml:1: stage.mass is 0; allowed is more than 0 kg"),
-        ("stage: {mass: 1, viscous: 1e7}", "run.yaml:1: stage.viscous is 1e+07; allowed is [0, 1e+06] N s/m"),
+        ("stage: {mass: 0}", "run.yaml:1: stage.mass is 0; allowed is more than 0 (kg)"),
+        (
+            "stage: {mass: 1, viscous: 1e7}",
+            "run.yaml:1: stage.viscous is 1e+07; allowed is [0, 1e+06] (N s/m)",
+        ),
         (
             "stage: {mass: 1, friction: []}",
             "run.yaml:1: stage.friction has 0 entries; it must have at least 1",
         ),
         (
             "stage: {mass: 1, friction: [{stiffness: 1, reach: -1e-6}]}",
-            "run.yaml:1: stage.friction[0].reach is -1e-06; allowed is (0, 1] m",
+            "run.yaml:1: stage.friction[0].reach is -1e-06; allowed is (0, 1] (m)",
         ),
         (
             "stage: {mass: 1, friction: {model: lugr, sigma_0: 1}}",
@@ -329,7 +332,7 @@ def test_an_unknown_key_that_explains_a_missing_one_is_one_problem() -> None:
 def test_several_problems_are_one_line_in_the_files_order() -> None:
     message = refused("stage:\n  mass: -1\n  axis: skew\nrate: fast\nsensor: {noise: .inf}\nfoo: 1\n")
     assert message == (
-        "run.yaml:2: stage.mass is -1; allowed is more than 0 kg (and 4 more: "
+        "run.yaml:2: stage.mass is -1; allowed is more than 0 (kg) (and 4 more: "
         "line 3 stage.axis is 'skew'; line 4 rate is 'fast'; line 5 sensor.noise is inf; ...)"
     )
 

@@ -12,7 +12,6 @@ import click
 from rtcomp.cli.output import prepare_file, prepare_output
 
 __all__ = [
-    "ColumnName",
     "Frequency",
     "force_option",
     "json_option",
@@ -40,23 +39,6 @@ class Frequency(click.ParamType[float]):
         if not (math.isfinite(number) and number > 0.0):
             self.fail(f"{value!r} is not a rate; give a positive number of Hz", param, ctx)
         return number
-
-
-class ColumnName(click.ParamType[tuple[str, str]]):
-    """A pair ``ours=theirs`` of column names."""
-
-    name = "COLUMN=NAME"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, str]:
-        """Return the pair, or fail with how one looks."""
-        if isinstance(value, tuple):
-            return value
-        ours, equals, theirs = str(value).partition("=")
-        if not (equals and ours.strip() and theirs.strip()):
-            self.fail(f"{value!r} is not COLUMN=NAME, such as position=qm", param, ctx)
-        return ours.strip(), theirs.strip()
 
 
 def output_options(default: str | None = None) -> Callable[[F], F]:
@@ -94,7 +76,6 @@ def map_option(function: F) -> F:
         "--map",
         "mapping",
         metavar="COLUMN=NAME",
-        type=ColumnName(),
         multiple=True,
         callback=_to_dict,
         help="What the file calls a column, such as position=qm; once for each.",
@@ -107,14 +88,9 @@ def rate_option(function: F) -> F:
     return click.option("--rate", type=Frequency(), metavar="HZ", help=says)(function)
 
 
-def _to_dict(
-    ctx: click.Context, param: click.Parameter, pairs: tuple[tuple[str, str], ...]
-) -> dict[str, str]:
-    found: dict[str, str] = {}
-    for ours, theirs in pairs:
-        if ours in found:
-            raise click.BadParameter(
-                f"{ours!r} is mapped twice, to {found[ours]!r} and {theirs!r}", ctx, param
-            )
-        found[ours] = theirs
-    return found
+def _to_dict(ctx: click.Context, param: click.Parameter, pairs: tuple[str, ...]) -> dict[str, str]:
+    if not pairs:
+        return {}
+    from rtcomp.recording.reader import parse_map
+
+    return parse_map(pairs)

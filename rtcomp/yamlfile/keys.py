@@ -30,11 +30,10 @@ def field_at(model: type[pydantic.BaseModel], key: KeyPath) -> FieldInfo | None:
     return found
 
 
-def unit_of(model: type[pydantic.BaseModel], key: KeyPath) -> str:
-    """Return the unit that the field of `key` states (``json_schema_extra={"unit": ...}``), or nothing."""
+def about(model: type[pydantic.BaseModel], key: KeyPath) -> str:
+    """Return what the field of `key` says of itself, unit first: `` (kg, moving mass)``; or nothing."""
     field = field_at(model, key)
-    extra = field.json_schema_extra if field is not None else None
-    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+    return f" ({field.description})" if field is not None and field.description else ""
 
 
 def allowed_range(field: FieldInfo | None) -> str:

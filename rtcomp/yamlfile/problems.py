@@ -9,7 +9,7 @@ from typing import Any
 
 import pydantic
 
-from rtcomp.yamlfile.keys import allowed_range, field_at, nearest_choice, nearest_key, unit_of
+from rtcomp.yamlfile.keys import about, allowed_range, field_at, nearest_choice, nearest_key
 from rtcomp.yamlfile.load import KeyPath, dotted, has, one_line
 
 _WANTED = {
@@ -67,7 +67,7 @@ def from_pydantic(
     placed = [_Placed.of(detail, data) for detail in details]
     problems = [_translate(group, model, section) for group in _choose_branches(placed)]
     suggested = {p.suggests for p in problems if p.suggests is not None}
-    missing = {p.key for p in problems if p.says.endswith("is missing")}
+    missing = {p.key for p in problems if p.brief.endswith(" is missing")}
     return [p for p in problems if not (p.key in missing and p.key in suggested)]
 
 
@@ -133,11 +133,10 @@ def _translate(group: list[_Placed], model: type[pydantic.BaseModel], section: K
     key = (*section, *inner)
     kind = str(detail["type"])
     context: Mapping[str, Any] = detail.get("ctx") or {}
-    unit = unit_of(model, inner)
-    behind = f" ({unit})" if unit else ""
+    behind = about(model, inner)
     value = _shown(detail.get("input"))
     if kind == "missing":
-        return _problem(key, f"{behind.strip() + ' ' if unit else ''}is missing", "is missing")
+        return _problem(key, f"is missing{behind}", "is missing")
     if kind == "extra_forbidden":
         return _unknown(model, section, inner)
     wanted = [w for w in (_wanted(item.detail) for item in group) if w]
@@ -149,7 +148,7 @@ def _translate(group: list[_Placed], model: type[pydantic.BaseModel], section: K
     if kind in _BOUND:
         name, words = _BOUND[kind]
         allowed = allowed_range(field_at(model, inner)) or f"{words} {context[name]:g}"
-        return _problem(key, f"is {value}; allowed is {allowed}{' ' + unit if unit else ''}", f"is {value}")
+        return _problem(key, f"is {value}; allowed is {allowed}{behind}", f"is {value}")
     if kind in ("literal_error", "enum"):
         hint = nearest_choice(detail.get("input"), str(context["expected"]))
         return _problem(key, f"is {value}; allowed is {context['expected']}{hint}", f"is {value}")
@@ -168,6 +167,7 @@ def _translate(group: list[_Placed], model: type[pydantic.BaseModel], section: K
         return _problem(key, f"has {count} entries; it must have {bound}", f"has {count} entries")
     if kind in ("value_error", "assertion_error"):
         message = one_line(str(context.get("error", detail["msg"])))
+        message = message.removeprefix(f"{key[-1]}: ") if key else message
         return Problem(key, f"{dotted(key)}: {message}" if key else message, dotted(key) or message)
     message = one_line(str(detail["msg"]))
     return _problem(key, f"is {value}; {message[:1].lower()}{message[1:]}", f"is {value}")

@@ -19,7 +19,7 @@ _MISSING = object()
 class Section(pydantic.BaseModel):
     """Base of typed sections of a file: unknown keys are errors, values do not change, numbers are finite.
 
-    Give a field its unit with ``pydantic.Field(json_schema_extra={"unit": "kg"})``; errors then state it.
+    Give a field its unit and meaning with ``pydantic.Field(description="kg, moving mass")``; errors state it.
     """
 
     model_config = pydantic.ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
