@@ -83,7 +83,7 @@ class SerialLink:
 
         Raises DeviceError where too many frames are damaged to drive a motor by.
         """
-        data = self.port.read(seconds) if seconds > 0.0 else b""
+        data = self.port.read(seconds)
         if not data:
             return None
         decoder = self.decoder
