@@ -68,13 +68,17 @@ def _own(file: Any) -> Table:
     if not metadata.get("complete"):
         ended = metadata.get("ended", "no")
         notes.append(
-            "the recording has no end (still being written, or its recorder was killed): read to its last flush"
+            "the recording has no end (being written, or its recorder was killed): read to its last flush"
             if ended == "no"
             else f"the recording did not end as it should ({ended})"
         )
     if metadata.get("rows_lost"):
         notes.append(f"the recorder lost {metadata['rows_lost']} rows")
-    return Table({name: column[:rows] for name, column in columns.items()}, metadata, notes)
+    weights = None
+    if "weights" in file:
+        time, learnt = file["weights/time"][()], file["weights/weights"][()]
+        weights = time[: len(learnt)], learnt[: len(time)]
+    return Table({name: column[:rows] for name, column in columns.items()}, metadata, notes, weights)
 
 
 def _tree(group: Any) -> dict[str, Any]:
@@ -98,10 +102,16 @@ def _tree(group: Any) -> dict[str, Any]:
 def _table(tree: Mapping[str, Any]) -> Table:
     """Flatten nested dicts of arrays."""
     table = Table({})
+    if isinstance(learnt := tree.get("weights"), Mapping) and {"time", "weights"} <= learnt.keys():
+        weights = np.atleast_2d(np.asarray(learnt["weights"], dtype=np.float64))
+        times = np.ravel(np.asarray(learnt["time"], dtype=np.float64))
+        table.weights = times, weights if len(weights) == len(times) else weights.T
+        tree = {name: value for name, value in tree.items() if name != "weights"}
     vectors: dict[str, Floats] = {}
     for where, value in _leaves(tree, ""):
+        where = where.removeprefix("metadata.")
         if isinstance(value, str):
-            table.metadata[where] = value
+            table.metadata[where] = _plain(value)
             continue
         array = np.squeeze(np.asarray(value))
         if array.dtype.kind not in "fiub":

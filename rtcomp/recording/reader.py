@@ -32,12 +32,16 @@ class Recording:
     """One table, rows equally spaced at `rate_hz`."""
 
     columns: dict[str, Floats]
-    """By name, all 1-D float64 of one length. ``outlier`` and ``gap`` are 1 where a row is not to be trusted."""
+    """By name, all 1-D float64 of one length. ``outlier`` and ``gap`` are 1 where a row is doubtful."""
     rate_hz: float
     metadata: dict[str, Any] = field(default_factory=dict)
     path: Path = Path()
     notes: list[str] = field(default_factory=list)
     """What was done on reading, one line each, for a person."""
+    weights: Floats | None = None
+    """The identifier's weights as they were learnt, (rows, N) at `weights_time`; None where not recorded."""
+    weights_time: Floats | None = None
+    """s."""
 
     def __len__(self) -> int:
         return len(self.columns["time"])
@@ -105,7 +109,8 @@ def read(
     _drop_repeated_times(table)
     sampling = examine(table.columns["time"])
     columns, rate = _even(path, table, sampling, rate_hz, method, mark_outliers)
-    return Recording(columns, rate, table.metadata, path, table.notes)
+    weights_time, weights = table.weights or (None, None)
+    return Recording(columns, rate, table.metadata, path, table.notes, weights, weights_time)
 
 
 def load(path: Path) -> Table:
@@ -125,7 +130,7 @@ def load(path: Path) -> Table:
 
 
 def parse_map(items: Iterable[str]) -> dict[str, str]:
-    """Return ``{"position": "qm"}`` from ``["position=qm"]``; raise ConfigError where an item is not of that form."""
+    """Return ``{"position": "qm"}`` from ``["position=qm"]``; raise ConfigError for anything else."""
     mapping: dict[str, str] = {}
     for item in items:
         name, equals, source = (part.strip() for part in item.partition("="))
@@ -185,8 +190,8 @@ def _check(path: Path, columns: Mapping[str, Floats], needed: Sequence[str]) -> 
             first = int(np.argmax(bad))
             value = "NaN" if np.isnan(columns[name][first]) else "infinite"
             raise RecordingError(
-                f"{path}: {name} is {value} in row {first + 1}; {int(bad.sum())} of its {len(bad)} values are "
-                "not finite; cut them out or repair them first"
+                f"{path}: {name} is {value} in row {first + 1}; {int(bad.sum())} of its {len(bad)} values "
+                "are not finite; cut them out or repair them first"
             )
     time = columns["time"]
     back = np.diff(time) < 0
@@ -202,8 +207,8 @@ def _check(path: Path, columns: Mapping[str, Floats], needed: Sequence[str]) -> 
         position = columns["position"]
         if np.ptp(position) <= 1e-15 * np.max(np.abs(position)):
             raise RecordingError(
-                f"{path}: position is constant ({position[0]:g} in all {len(position)} rows); nothing moved, or the "
-                "wrong column is mapped"
+                f"{path}: position is constant ({position[0]:g} in all {len(position)} rows); nothing moved, "
+                "or the wrong column is mapped"
             )
 
 
@@ -213,7 +218,7 @@ def _drop_repeated_times(table: Table) -> None:
     if again.any():
         first = int(np.argmax(again)) + 1
         table.notes.append(
-            f"{int(again.sum())} rows repeat the time before them (first: row {first}): left out"
+            f"{_count(again.sum(), 'row')} of a time already seen (first: row {first}): left out"
         )
         table.columns = {name: column[~again] for name, column in table.columns.items()}
 
@@ -232,7 +237,7 @@ def _even(
             columns["time"] = time[0] + np.arange(len(time)) / rate
         if sampling.jitter > 1e-2:
             notes.append(
-                f"time stamps jitter by up to {100 * sampling.jitter:.0f} % of the period: taken as even"
+                f"time stamps jitter by {100 * sampling.jitter:.0f} % of the period at most: taken as even"
             )
         even = columns
     else:
@@ -257,8 +262,8 @@ def _even(
             even["gap"] = gap.astype(np.float64)
             longest = int(np.argmax(intervals))
             notes.append(
-                f"{len(sampling.gaps)} gaps, longest {intervals[longest]:.4g} s at {time[longest]:.6g} s: "
-                f"{int(gap.sum())} rows bridged and marked in column 'gap'"
+                f"{_count(len(sampling.gaps), 'gap')}, longest {intervals[longest]:.4g} s at "
+                f"{time[longest]:.6g} s: {_count(gap.sum(), 'row')} bridged and marked in column 'gap'"
             )
         marked = marks(even["time"], time, marked)
     if marked.any() or "outlier" in even:
@@ -276,10 +281,13 @@ def _marked(columns: Mapping[str, Floats], notes: list[str]) -> npt.NDArray[np.b
             marked |= found
             if found.any():
                 at = columns["time"][int(np.argmax(found))]
-                notes.append(
-                    f"{int(found.sum())} outliers in {name} (first at {at:.6g} s): marked in column 'outlier'"
-                )
+                many = _count(found.sum(), "outlier")
+                notes.append(f"{many} in {name} (first at {at:.6g} s): marked in column 'outlier'")
     return marked
+
+
+def _count(number: Any, what: str) -> str:
+    return f"{int(number)} {what}{'' if number == 1 else 's'}"
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -14,7 +14,7 @@ JITTER = 0.1
 GAP = 1.75
 """An interval longer than this times the usual longest one (95th percentile) is a gap."""
 SMOOTH = ("position", "reference", "velocity")
-"""Columns of continuous motion, interpolated by a monotone cubic; commands and the like go in straight lines."""
+"""Columns of continuous motion, interpolated by a monotone cubic; all others go in straight lines."""
 MEASURED = (*SMOOTH, "voltage", "current", "force")
 """Columns that have values in between even where all are whole numbers (encoder counts, duty cycles)."""
 METHODS = ("cubic", "linear")
@@ -51,7 +51,7 @@ def examine(time: Floats) -> Sampling:
 def _round(rate: float) -> float:
     """Return `rate`, or the round number that it is but for the rounding of time stamps."""
     near = round(rate, 1) if rate >= 10 else round(rate, 3)
-    return near if near and abs(rate / near - 1.0) < 1e-6 else float(rate)
+    return near if near and abs(rate / near - 1.0) < 1e-6 else float(f"{rate:.12g}")
 
 
 def resample(
@@ -61,8 +61,8 @@ def resample(
 
     `method` ``cubic`` interpolates motion (SMOOTH) by a monotone cubic (Fritsch and Carlson 1980, SIAM J.
     Numer. Anal. 17:238), which cannot ring beside an outlier or a step, and everything else linearly;
-    ``linear`` takes straight lines throughout. Flags and counters (whole numbers, not MEASURED) hold their last
-    value. Where `rate_hz` is well below the rate of the rows, all but those are low-pass filtered
+    ``linear`` takes straight lines throughout. Flags and counters (whole numbers, not MEASURED) hold their
+    last value. Where `rate_hz` is well below the rate of the rows, all but those are low-pass filtered
     alike, without phase, below the new Nyquist frequency (on a finer grid, then decimated): what could not
     be represented must not fold back.
     """

@@ -21,6 +21,8 @@ class Table:
     columns: dict[str, Floats]
     metadata: dict[str, Any] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    weights: tuple[Floats, Floats] | None = None
+    """The identifier's weights: times (n,) in s and weights (n, N)."""
 
 
 CSV, GZIP, MAT5, HDF5 = "CSV text", "a gzip file", "a MATLAB 5 file", "an HDF5 file"
@@ -64,20 +66,17 @@ def kind(path: Path) -> str:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
     if not head:
         raise RecordingError(f"{path}: is empty")
-    found = _kind_of(head)
+    found = kind_of(head)
     expected = _EXPECTED.get(path.suffix.lower(), (CSV, GZIP, MAT5, HDF5))
     if found not in expected:
         if found in (CSV, GZIP, MAT5, HDF5):
-            raise RecordingError(
-                f"{path}: is not what its name says: it looks like {found}; rename it if it is one"
-            )
-        raise RecordingError(
-            f"{path}: looks like {found}; recordings are read from CSV, CSV.gz, MAT and HDF5"
-        )
+            raise RecordingError(f"{path}: is not what its name says: it looks like {found}; rename it")
+        raise RecordingError(f"{path}: looks like {found}; readable are CSV, CSV.gz, MAT and HDF5")
     return found
 
 
-def _kind_of(head: bytes) -> str:
+def kind_of(head: bytes) -> str:
+    """Return what a file is that begins with `head`: one of the kinds that are read, or another's name."""
     if head.startswith(b"\x1f\x8b"):
         return GZIP
     if any(head[start : start + 8] == _HDF5_SIGNATURE for start in (0, 512, 1024, 2048)):

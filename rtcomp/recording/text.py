@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from rtcomp.errors import RecordingError
-from rtcomp.recording.table import CSV, Floats, Table, _kind_of
+from rtcomp.recording.table import CSV, Floats, Table, kind_of
 
+_CONTRACT = ("time", "reference", "position", "voltage")
 _SEPARATORS = ("\t", ";", ",")
 
 
@@ -33,9 +34,8 @@ def read_text(path: Path, gzipped: bool) -> Table:
         names = next((n for c in reversed(comments) if len(n := _split(c, _separator(c))) == len(names)), [])
         start = first
         if not names:
-            raise RecordingError(
-                f"{path}: no header line names the columns; the first line is {header.strip()[:60]!r}"
-            )
+            shown = header.strip()[:60]
+            raise RecordingError(f"{path}: no header line names the columns; the first line is {shown!r}")
     if len(set(names)) != len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise RecordingError(f"{path}: two columns are named {twice!r}")
@@ -63,7 +63,7 @@ def _decode(path: Path, data: bytes) -> str:
         raise RecordingError(f"{path}: is empty")
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return data.decode("utf-16", errors="replace").replace("\r\n", "\n")
-    if (inside := _kind_of(data[:4096])) != CSV:
+    if (inside := kind_of(data[:4096])) != CSV:
         raise RecordingError(f"{path}: is not what its name says: inside it looks like {inside}")
     text = data.decode("utf-8-sig", errors="replace")
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
@@ -108,7 +108,7 @@ def _field_by_field(
     for number, row in enumerate(rows, 1):
         if len(row) != len(names):
             raise RecordingError(
-                f"{path}: row {number} has {len(row)} fields, the header names {len(names)} columns"
+                f"{path}: the header names {len(names)} columns, row {number} has {len(row)}"
             )
     columns: dict[str, Floats] = {}
     for i, name in enumerate(names):
