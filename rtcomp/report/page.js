@@ -45,7 +45,10 @@
     return Plotly.react(place, copy(figure.data, dark), fit(copy(figure.layout, dark), width), {
       displaylogo: false,
       displayModeBar: byTouch.matches ? false : "hover",
-      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+      modeBarButtons: [["toImage"], ["zoom2d", "pan2d", "resetScale2d"]],
+      // A report is the reader's own: nothing in it offers to send it anywhere.
+      showSendToCloud: false,
+      plotlyServerURL: "",
       toImageButtonOptions: { format: "svg", filename: place.getAttribute("aria-label") },
     });
   };

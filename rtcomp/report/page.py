@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import html
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,13 +13,17 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rtcomp.report import palette
 from rtcomp.report.quantities import written
+from rtcomp.yamlfile import write_text
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 _HERE = Path(__file__).parent
 # The browser itself refuses every connection, whatever the plots' library would like to load.
-_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
+    "form-action 'none'; base-uri 'none'"
+)
 
 
 class Row(NamedTuple):
@@ -61,17 +64,11 @@ class Page:
 def write_page(path: str | Path, page: Page) -> Path:
     """Write `page` as one HTML file and return its path.
 
-    The file appears whole or not at all; a file of that name is replaced. Raises OSError where it cannot be
-    written.
+    The file appears whole or not at all; a file of that name is replaced. Raises RtcompError where it cannot
+    be written.
     """
-    target = Path(path)
-    unfinished = target.with_name(f".{target.name}.{os.getpid()}")
-    try:
-        unfinished.write_text(render_page(page), encoding="utf-8")
-        unfinished.replace(target)
-    finally:
-        unfinished.unlink(missing_ok=True)
-    return target
+    write_text(path, render_page(page))
+    return Path(path)
 
 
 def render_page(page: Page) -> str:

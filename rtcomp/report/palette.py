@@ -9,8 +9,8 @@ from __future__ import annotations
 REFERENCE = "#707a88"
 MEASURED = "#1b6ec2"
 MODEL = "#d97b00"
-WITHOUT = "#b3325a"
-WITH = "#0a8a72"
+WITHOUT = "#a31d14"
+WITH = "#17916a"
 EXTRA = "#7d58c2"
 
 INK = "#1f2733"
@@ -23,8 +23,8 @@ DARK: dict[str, str] = {
     REFERENCE: "#9aa5b5",
     MEASURED: "#5fb0f5",
     MODEL: "#f6a93b",
-    WITHOUT: "#f0799a",
-    WITH: "#43cfae",
+    WITHOUT: "#e5483f",
+    WITH: "#80e6b6",
     EXTRA: "#b79cf2",
     INK: "#e6eaf0",
     MUTED: "#a3adbb",

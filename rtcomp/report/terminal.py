@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
+from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, ProgressColumn, Task, TaskID, TextColumn
 from rich.progress import Progress as RichProgress
@@ -104,10 +105,10 @@ class Progress:
 
 
 def summary_table(title: str, rows: Sequence[Row | tuple[Any, ...]]) -> Table:
-    """Return the closing table: name, value with its unit, note. Rows as in the page (name, value, unit,
-    note).
-    """
-    table = Table(title=Text(title, style="bold"), title_justify="left", show_header=False, pad_edge=False)
+    """Return the closing table; rows as in the page: name, value, unit, note."""
+    table = Table(
+        title=Text(title, style="bold"), title_justify="left", show_header=False, box=box.HORIZONTALS
+    )
     table.add_column(overflow="fold")
     table.add_column(justify="right", style="bold", overflow="fold")
     lines = [Row(*row) for row in rows]

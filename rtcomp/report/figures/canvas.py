@@ -77,7 +77,7 @@ def canvas(x: str, y: str, *, height: int = 360, unified: bool = True) -> go.Fig
     figure.update_layout(
         template="none",
         height=height,
-        margin={"l": 68, "r": 18, "t": 44, "b": 54},
+        margin={"l": 68, "r": 18, "t": 52, "b": 54},
         font={"family": FONT, "size": 13, "color": palette.INK},
         # Without a fill: the page's own background, light or dark, shines through.
         paper_bgcolor="rgba(0,0,0,0)",

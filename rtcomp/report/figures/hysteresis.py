@@ -98,12 +98,13 @@ def virgin_figure(
 ) -> go.Figure:
     """Return the weights as the virgin curve they stand for, with the interval boundaries.
 
-    `widths` (`unit`) and `weights` (`force_unit` per `unit`) have one entry an interval. Intervals whose
-    `reached` is false were never touched by the motion learned from: they are drawn hollow and grey. `truth`
-    is the true virgin curve, (travel, force), where it is known. Raises ValueError where lengths differ.
+    `widths` (`unit`) and `weights` (`force_unit` per `unit`) have one entry an interval. `reached` is the
+    part of each (0 to 1, or whether at all) that the motion learned from exercised; where it is 0, it
+    is drawn hollow and grey. `truth` is the true virgin curve, (travel, force), where it is known. Raises
+    ValueError where lengths differ.
     """
     a, w = c.floats(widths), c.floats(weights)
-    touched = np.ones(len(a), dtype=bool) if reached is None else np.asarray(reached, dtype=bool).reshape(-1)
+    touched = np.ones(len(a), dtype=bool) if reached is None else c.floats(reached) > 0.0
     c.same_length(widths=a, weights=w, reached=touched.astype(np.float64))
     travel, force = virgin_curve(a, w)
     true = None if truth is None else (c.floats(truth[0]), c.floats(truth[1]))
@@ -131,11 +132,11 @@ def virgin_figure(
             figure, true[0][inside] * along.factor, true[1][inside] * up.factor, "true virgin curve",
             palette.REFERENCE, width=4.0, hoverinfo="skip",
         )  # fmt: skip
-    says = [
-        f"interval {i + 1}: width {written(a[i], unit, printed=True)}, "
-        f"weight {written(w[i], f'{force_unit}/{unit}', printed=True)}"
-        for i in range(len(a))
-    ]
+
+    def says(i: int) -> str:
+        width, weight = written(a[i], unit, printed=True), written(w[i], f"{force_unit}/{unit}", printed=True)
+        return f"interval {i + 1}: width {width}, weight {weight}"
+
     for flag, name, colour, dash in (
         (True, "model", palette.MODEL, "solid"),
         (False, "never reached", palette.MUTED, "dot"),
@@ -150,13 +151,14 @@ def virgin_figure(
             figure, lines_x, lines_y, name, colour, width=2.0, dash=dash,
             showlegend=False, legendgroup=name, hoverinfo="skip",
         )  # fmt: skip
+        dots = mine[::every]
         figure.add_scatter(
-            x=c.compact(x[mine + 1]), y=c.compact(y[mine + 1]), name=name, mode="markers", legendgroup=name,
+            x=c.compact(x[dots + 1]), y=c.compact(y[dots + 1]), name=name, mode="markers", legendgroup=name,
             marker={
                 "color": colour if flag else palette.PAPER, "size": 7 if len(a) <= 60 else 4,
                 "line": {"color": colour, "width": 1.5},
             },
-            text=[says[i] for i in mine], hovertemplate="%{text}<extra></extra>",
+            text=[says(int(i)) for i in dots], hovertemplate="%{text}<extra></extra>",
         )  # fmt: skip
     unreached = int(np.sum(~touched))
     if unreached:
@@ -164,5 +166,5 @@ def virgin_figure(
             figure, f"{unreached} of {len(a)} intervals were never reached; their weights are not learned."
         )
     if every > 1:
-        c.note(figure, f"One boundary in {every} is drawn.")
+        c.note(figure, f"One interval boundary in {every} is drawn.")
     return figure

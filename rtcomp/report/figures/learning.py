@@ -66,9 +66,10 @@ def learning_figure(
             type="line", xref="paper", x0=0, x1=1, y0=level, y1=level,
             line={"color": palette.MUTED, "width": 1, "dash": "dash"},
         )  # fmt: skip
+        text = f"{c.safe(name)}: {si(level, '%')}"
         figure.add_annotation(
-            text=f"{c.safe(name)}: {si(level, '%')}", xref="paper", x=1, xanchor="right",
-            y=float(np.log10(level)), yanchor="bottom", showarrow=False, font={"color": palette.MUTED, "size": 12},
+            text=text, xref="paper", x=1, xanchor="right", y=float(np.log10(level)), yanchor="bottom",
+            showarrow=False, font={"color": palette.MUTED, "size": 12},
         )  # fmt: skip
     _logarithmic_y(figure, [*ys, c.floats(list((levels or {}).values()))])
     if log_x:

@@ -95,19 +95,18 @@ def error_bars_figure(sizes: dict[str, Figures], *, unit: str = "m") -> go.Figur
     if shown.size == 0:
         c.say_if_empty(figure, [])
         return figure
-    for index, (name, size) in enumerate(reversed(sizes.items())):
+    for index, (name, size) in enumerate(sizes.items()):
         colour = _COLOURS.get(name, palette.series(index)[0])
-        for what, value, opacity in (("peak", size.peak, 0.5), ("rms", size.rms, 1.0)):
+        for what, value, opacity in (("rms", size.rms, 1.0), ("peak", size.peak, 0.5)):
             figure.add_bar(
-                x=[value * drawn_in.factor if value > 0.0 else None],
-                y=[[c.safe(_NAMES.get(name, name))], [what]],
+                x=[value * drawn_in.factor if value > 0.0 else None], y=[f"{c.safe(name)}, {what}"],
                 orientation="h", marker={"color": colour, "opacity": opacity}, showlegend=False,
                 text=written(value, unit, printed=True), textposition="outside", cliponaxis=False,
                 hovertemplate="%{text}<extra></extra>",
             )  # fmt: skip
     low, high = float(shown.min()) * drawn_in.factor, float(shown.max()) * drawn_in.factor
     # Bars on a log axis have no natural foot: a factor of three below the smallest, the same for all.
-    figure.update_xaxes(c.logarithmic(low / 3.0, high * 1.3, room=0.0))
-    figure.update_yaxes(dividercolor=palette.GRID, showgrid=False)
-    figure.update_layout(margin={"t": 16})
+    figure.update_xaxes(c.logarithmic(low / 3.0, high * 1.6 * (high / low) ** 0.25, room=0.0))
+    figure.update_yaxes(autorange="reversed", showgrid=False, ticks="")
+    figure.update_layout(margin={"t": 30}, bargap=0.3)
     return figure
