@@ -49,7 +49,7 @@ class Gms(Section):
 class Stage(Section):
     axis: Literal["linear", "rotary"] = "linear"
     mass: float = Field(gt=0, description="kg")
-    viscous: float = Field(0.0, ge=0, le=1e6, description="N s/m")
+    viscous: float = Field(0.0, ge=0, le=1e6, json_schema_extra={"unit": "N s/m"})
     friction: (
         Annotated[list[Element], Field(min_length=1)]
         | Annotated[LuGre | Gms, Field(discriminator="model")]

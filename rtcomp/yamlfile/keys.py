@@ -33,7 +33,12 @@ def field_at(model: type[pydantic.BaseModel], key: KeyPath) -> FieldInfo | None:
 def about(model: type[pydantic.BaseModel], key: KeyPath) -> str:
     """Return what the field of `key` says of itself, unit first: `` (kg, moving mass)``; or nothing."""
     field = field_at(model, key)
-    return f" ({field.description})" if field is not None and field.description else ""
+    if field is None:
+        return ""
+    extra = field.json_schema_extra
+    unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+    parts = [part for part in (unit, field.description) if part]
+    return f" ({', '.join(parts)})" if parts else ""
 
 
 def allowed_range(field: FieldInfo | None) -> str:

@@ -19,7 +19,8 @@ _MISSING = object()
 class Section(pydantic.BaseModel):
     """Base of typed sections of a file: unknown keys are errors, values do not change, numbers are finite.
 
-    Give a field its unit and meaning with ``pydantic.Field(description="kg, moving mass")``; errors state it.
+    Give a field its unit with ``Field(description="kg, moving mass")``, or with
+    ``Field(json_schema_extra={"unit": "kg"})``; errors state it.
     """
 
     model_config = pydantic.ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
