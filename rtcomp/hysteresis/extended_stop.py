@@ -21,7 +21,7 @@ import numpy as np
 
 from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.basis import Basis, register_basis
-from rtcomp.hysteresis.stop import checked_reaches
+from rtcomp.hysteresis.stop import StopBasis, checked_reaches
 from rtcomp.kernels import Floats, basis_kernel
 
 STARTED, ORIGIN, PLAY = 0, 1, 2
@@ -63,6 +63,14 @@ class ExtendedStopBasis(Basis):
         self.travel = float(self.reaches.max()) if travel is None else float(travel)
         if not (np.isfinite(self.travel) and self.travel > 0):
             raise ConfigError(f"extended-stop model: travel is {self.travel:g} m; it must be above 0")
+
+    @classmethod
+    def over(cls, count: int, total: float, spacing: float = 1.0) -> ExtendedStopBasis:
+        """Give `count` regressors: one for the travel, the others stops up to total / 2 (m).
+
+        The last gap between reaches is `spacing` times as wide as the first.
+        """
+        return cls(StopBasis.over(max(count - 1, 1), total, spacing).reaches)
 
     @property
     def size(self) -> int:

@@ -5,6 +5,10 @@ of relays is divided into squares of side h = 2 R / L (triangles on the diagonal
 share of its cell that is up, times h, counted from the virgin state. The line between up and down is
 followed exactly through the cells, not in jumps from cell to cell, so that the output is continuous.
 
+Positive densities make the output lag the input, as magnetisation does. Friction leads: force against
+position needs positive densities on the diagonal and negative ones off it (stop = input - play), so a learner
+that keeps weights non-negative cannot find it here.
+
 The plane covers +-R about the starting point; beyond it the model is saturated. Falling is rising in the
 plane mirrored at alpha = -beta, so that there is one routine: (alpha, beta) -> (-beta, -alpha).
 """
@@ -173,6 +177,16 @@ class PreisachBasis(Basis):
             raise ConfigError(f"preisach model: reach is {reach:g} m; it must be above 0")
         self.divisions = int(divisions)
         self.reach = float(reach)
+
+    @classmethod
+    def over(cls, count: int, total: float, spacing: float = 1.0) -> PreisachBasis:
+        """Cover +-total / 2 (m) about the start with at most `count` cells, all equal (`spacing` must be 1).
+
+        Give the range of the motion: unlike the other operators the plane does not move along with it.
+        """
+        if spacing != 1.0:
+            raise ConfigError(f"preisach model: spacing is {spacing:g}; its cells are equal, so it must be 1")
+        return cls(max(int((np.sqrt(8.0 * count + 1.0) - 1.0) / 2.0), 1), 0.5 * total)
 
     @property
     def side(self) -> float:

@@ -67,9 +67,13 @@ class StopBasis(Basis):
         self.reaches = checked_reaches(reaches, self.name)
 
     @classmethod
-    def equal(cls, count: int, reach: float) -> StopBasis:
-        """Spread `count` reaches evenly up to `reach` (m), as Kuhnen does."""
-        return cls(reach * np.arange(1, count + 1) / count)
+    def over(cls, count: int, total: float, spacing: float = 1.0) -> StopBasis:
+        """Put the reaches where the interval operator of the same arguments has its corners.
+
+        `count` reaches up to total / 2 (m), the last gap `spacing` times as wide as the first.
+        """
+        gaps = np.geomspace(1.0, spacing, count)
+        return cls(np.cumsum(gaps) * (0.5 * total / gaps.sum()))
 
     @property
     def size(self) -> int:

@@ -133,6 +133,19 @@ def test_extended_stops_go_on_rising_after_yielding():
     assert np.array_equal(out[2, :2], out[3, :2])
 
 
+def test_stops_lead_and_relays_lag():
+    """Friction loses work on every loop; a Preisach plane of positive density turns the other way round.
+
+    So the plane needs negative densities off its diagonal to be friction, and its learner must allow them.
+    """
+    u = 0.9 * np.sin(np.linspace(0.0, 4.0 * np.pi, 2001))
+    work = {
+        basis.name: np.trapezoid(regressors(basis, u)[1000:] @ np.ones(basis.size), u[1000:])
+        for basis in (StopBasis.over(6, 1.0), ExtendedStopBasis.over(6, 1.0), PreisachBasis.over(21, 2.0))
+    }
+    assert work["stop"] > 0.1 and work["extended-stop"] > 0.1 and work["preisach"] < -0.1
+
+
 class Relays:
     """The Preisach plane by brute force: a fine grid of relays, switched one by one."""
 
