@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import click
 
-from rtcomp.cli.output import prepare_file, prepare_output
+from rtcomp.cli.output import prepare_output
 
 __all__ = [
     "Frequency",
@@ -17,7 +17,6 @@ __all__ = [
     "json_option",
     "map_option",
     "output_options",
-    "prepare_file",
     "prepare_output",
     "rate_option",
 ]

@@ -53,29 +53,6 @@ def prepare_output(path: str | Path, force: bool = False) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def prepare_file(path: str | Path, force: bool = False) -> Iterator[Path]:
-    """Give a temporary name beside `path`, with its ending; the file there moves to `path` at the end.
-
-    Raises OutputExistsError where `path` exists (without `force`) or is a folder, RtcompError where it
-    cannot be written.
-    """
-    path = Path(path)
-    if path.is_dir():
-        raise OutputExistsError(f"{path} is a folder; name a file")
-    if path.exists() and not force:
-        raise OutputExistsError(f"{path} exists; choose another name, or --force to replace it")
-    if not path.parent.is_dir():
-        raise RtcompError(f"{path} cannot be written: there is no folder {path.parent}")
-    temporary = path.with_name(f".{os.getpid()}.{path.name}")
-    try:
-        yield temporary
-        with _as_rtcomp_error(path):
-            temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-@contextlib.contextmanager
 def _as_rtcomp_error(path: Path) -> Iterator[None]:
     try:
         yield

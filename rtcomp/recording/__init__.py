@@ -1,1 +1,1 @@
-"""recording"""
+"""Recordings: written by a process of their own, read whoever wrote them, converted."""

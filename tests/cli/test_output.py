@@ -1,4 +1,4 @@
-"""Output folders and files: nothing is overwritten unasked, nothing is lost when a run fails."""
+"""Output folders: nothing is overwritten unasked, nothing is lost when a run fails."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rtcomp.cli.output import MANIFEST, prepare_file, prepare_output
+from rtcomp.cli.output import MANIFEST, prepare_output
 from rtcomp.errors import DeviceError, OutputExistsError, RtcompError
 
 
@@ -126,23 +126,3 @@ def test_the_manifest_cannot_reach_outside(tmp_path: Path) -> None:
     (out / MANIFEST).write_text(f"../precious\n{tmp_path}/precious\nrecording.h5\n")
     write(out, "two", force=True)
     assert (tmp_path / "precious").read_text() == "mine"
-
-
-def test_a_file_appears_complete_or_not_at_all(tmp_path: Path) -> None:
-    target = tmp_path / "out.csv"
-    with prepare_file(target) as temporary:
-        assert temporary.suffix == ".csv"
-        temporary.write_text("new")
-        assert not target.exists()
-    assert target.read_text() == "new"
-    with pytest.raises(OutputExistsError, match="--force"), prepare_file(target):
-        pass
-    with pytest.raises(DeviceError), prepare_file(target, force=True) as temporary:
-        temporary.write_text("half")
-        raise DeviceError("gone")
-    assert target.read_text() == "new"
-    with pytest.raises(OutputExistsError, match="is a folder"), prepare_file(tmp_path, force=True):
-        pass
-    with pytest.raises(RtcompError, match="there is no folder"), prepare_file(tmp_path / "no" / "out.csv"):
-        pass
-    assert [p.name for p in tmp_path.iterdir()] == ["out.csv"]
