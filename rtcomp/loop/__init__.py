@@ -1,1 +1,1 @@
-"""The fixed-rate loop: device protocol, clock, the one tick, states and safety, the ring to other processes."""
+"""The fixed-rate loop: device protocol, clock, the one tick, states and safety, the ring to others."""
