@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from rtcomp.errors import ConfigError
 from rtcomp.loop.device import INVALID, OK, EndOfRun, Sample
 from rtcomp_drivers.driver import Bench, Driver, DriverSettings, check_volts
@@ -36,6 +38,10 @@ class ReplayDriver(Driver):
         self._voltages: list[float] = columns["voltage"].tolist()
         has_reference = "reference" in columns
         self._references: list[float] | None = columns["reference"].tolist() if has_reference else None
+        doubtful = [columns[name] for name in ("outlier", "gap") if name in columns]
+        for rows in doubtful:
+            for k in np.flatnonzero(rows):
+                self._positions[k] = math.nan
         self._row = -1
         self._open = False
 
@@ -62,8 +68,8 @@ class ReplayDriver(Driver):
     def exchange(self, volts: float) -> Sample:
         """Return the next row's position and time; raise EndOfRun behind the last row.
 
-        The command is checked as on any device and then ignored. A row whose position is not finite
-        comes with status INVALID and the last valid position.
+        The command is checked as on any device and then ignored. A row whose position is not finite,
+        or marked as an outlier or a gap, comes with status INVALID and the last valid position.
         """
         if not self._open:
             raise self.not_open()
