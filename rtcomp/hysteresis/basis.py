@@ -45,6 +45,14 @@ class Basis:
         """Return the amplitude of each regressor when fully exercised, shape (size,); m for an input in m."""
         raise NotImplementedError
 
+    @classmethod
+    def over(cls, count: int, total: float, spacing: float = 1.0) -> Basis:
+        """Spread `count` elements over the range `total` (m, from full saturation to full saturation).
+
+        `spacing` is the width of the last over that of the first, geometric in between; 1 for equal.
+        """
+        raise NotImplementedError
+
     def to_dict(self) -> dict[str, Any]:
         """Return the basis as a model file writes it, with its name under ``model``."""
         raise NotImplementedError

@@ -128,14 +128,9 @@ class IntervalBasis(Basis):
                 raise ConfigError(f"interval model: widths[{i}] is {width:g} m; a width must be above 0")
 
     @classmethod
-    def equal(cls, count: int, total: float) -> IntervalBasis:
-        """Divide the range `total` (m) into `count` equal intervals, as the paper does."""
-        return cls(np.full(count, total / count))
-
-    @classmethod
-    def geometric(cls, count: int, total: float, ratio: float) -> IntervalBasis:
-        """Divide `total` (m) into `count` intervals, the last `ratio` times as wide as the first."""
-        widths = np.geomspace(1.0, ratio, count)
+    def over(cls, count: int, total: float, spacing: float = 1.0) -> IntervalBasis:
+        """Divide `total` (m) into `count` intervals, the last `spacing` times as wide as the first."""
+        widths = np.geomspace(1.0, spacing, count)
         return cls(widths * (total / widths.sum()))
 
     @property

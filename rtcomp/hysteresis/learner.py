@@ -33,6 +33,13 @@ class Learner:
         """Return the kernel's state before it has learned anything."""
         raise NotImplementedError
 
+    def information(self, state: Floats, scales: Floats) -> Floats:
+        """Return what `state` knows of each combination of weights, (N, N), up to a factor.
+
+        A learner that keeps no covariance counts every regressor by its amplitude.
+        """
+        return np.diag(scales**2)
+
     def to_dict(self) -> dict[str, Any]:
         """Return name and settings as a configuration writes them."""
         raise NotImplementedError

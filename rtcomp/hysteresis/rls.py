@@ -78,6 +78,11 @@ class Rls(Learner):
         """Return the initial covariance, diagonal, and room for scratch."""
         return np.concatenate([np.diag((self.trust / scales) ** 2).ravel(), np.zeros(scales.size)])
 
+    def information(self, state: Floats, scales: Floats) -> Floats:
+        """Return the inverse of the covariance."""
+        n = scales.size
+        return np.asarray(np.linalg.inv(state[: n * n].reshape(n, n)))
+
     def to_dict(self) -> dict[str, Any]:
         """Return name, forgetting and trust."""
         return {"learner": self.name, "forgetting": self.forgetting, "trust": self.trust}

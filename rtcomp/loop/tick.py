@@ -230,6 +230,7 @@ class Tick:
         if weights is not None:
             self.weights[:] = weights
         self.offset_scale = offset_scale
+        self.basis, self.learner, self.scales = basis, learner, all_scales
         x, lead_x = np.zeros(n + 1), np.zeros(n + 1)
         x[n] = lead_x[n] = offset_scale
         self.identifier = Identifier(
@@ -252,6 +253,16 @@ class Tick:
     def row_width(self) -> int:
         """Numbers in a row of the ring: the columns, the weights, the offset."""
         return int(self.row.size)
+
+    @property
+    def delay_ticks(self) -> int:
+        """Ticks until a command takes effect, as the identifier assumes."""
+        return int(self.settings[DELAY])
+
+    @property
+    def closed_loop(self) -> bool:
+        """Whether feedback runs; otherwise the plan's voltages go out."""
+        return bool(self.settings[CLOSED])
 
     @property
     def fault(self) -> int:

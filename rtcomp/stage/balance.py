@@ -16,7 +16,20 @@ import numpy as np
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics import Effect, Place, wires
 from rtcomp.physics.wires import (
-    ACCELERATION, DRIVE, FRICTION, GAIN, MASS, MOVED, POSITION, PUSH, REACH, SCALE, STEP, TIME, VELOCITY, VOLTS,
+    ACCELERATION,
+    DRIVE,
+    FRICTION,
+    GAIN,
+    MASS,
+    MOVED,
+    POSITION,
+    PUSH,
+    REACH,
+    SCALE,
+    STEP,
+    TIME,
+    VELOCITY,
+    VOLTS,
 )  # fmt: skip
 from rtcomp.stage.simulate import Program, run_chain
 from rtcomp.stage.stage import Stage
@@ -118,8 +131,7 @@ def force_balance(
     """
     period = float((time[-1] - time[0]) / (time.size - 1))
     cut = bandwidth(1.0 / period) if bandwidth_hz is None else bandwidth_hz
-    smooth = _ZeroPhase(cut, 1.0 / period)
-    slow = smooth(position)
+    slow = zero_phase(position, cut, 1.0 / period)
     velocity = np.gradient(slow, period)
     acceleration = np.zeros_like(slow)
     acceleration[1:-1] = (slow[2:] - 2 * slow[1:-1] + slow[:-2]) / period**2
@@ -130,18 +142,12 @@ def force_balance(
     after = forces(stage, drive, time, position, velocity, acceleration, voltage).drive
     motion = forces(stage, rest, time, position, velocity, acceleration, voltage)
     needed = motion.mass * acceleration + motion.friction - motion.push
-    return Balance(smooth(0.5 * (before + after)), smooth(needed), cut)
+    given = 0.5 * (before + after)
+    return Balance(zero_phase(given, cut, 1.0 / period), zero_phase(needed, cut, 1.0 / period), cut)
 
 
-class _ZeroPhase:
-    """A second-order Butterworth run forward and backward."""
+def zero_phase(signal: Floats, cutoff_hz: float, rate_hz: float) -> Floats:
+    """Low-pass `signal` (K,) without delay: a second-order Butterworth forward and backward."""
+    from scipy.signal import butter, sosfiltfilt
 
-    def __init__(self, cutoff_hz: float, rate_hz: float) -> None:
-        from scipy.signal import butter
-
-        self._sections = butter(2, cutoff_hz, fs=rate_hz, output="sos")
-
-    def __call__(self, signal: Floats) -> Floats:
-        from scipy.signal import sosfiltfilt
-
-        return np.asarray(sosfiltfilt(self._sections, signal), dtype=np.float64)
+    return np.asarray(sosfiltfilt(butter(2, cutoff_hz, fs=rate_hz, output="sos"), signal), dtype=np.float64)

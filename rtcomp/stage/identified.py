@@ -15,6 +15,7 @@ import numpy as np
 from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.basis import bases
 from rtcomp.hysteresis.interval import IntervalBasis
+from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.physics import Effect
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 
@@ -25,18 +26,18 @@ def is_identified(name: object) -> bool:
 
 
 def stop_bank(entry: Mapping[str, Any]) -> Effect:
-    """Return the stop elements of ``{model: interval, widths: [...], weights: [...]}``."""
-    if entry["model"] != IntervalBasis.name:
+    """Return the stop elements of ``{model: interval, widths: [...], weights: [...]}``.
+
+    The model's constant offset is no friction and is left out here.
+    """
+    model = HysteresisModel.from_dict(entry)
+    if not isinstance(model.basis, IntervalBasis):
         raise ConfigError(
-            f"friction: a model of basis {entry['model']!r} cannot be simulated as a stage's friction; "
+            f"friction: a model of basis {model.basis.name!r} cannot be simulated as a stage's friction; "
             "identify with basis 'interval'"
         )
-    weights = np.asarray(entry.get("weights", []), dtype=np.float64)
-    basis = IntervalBasis(entry.get("widths", []))
-    if weights.size != basis.size:
-        raise ConfigError(f"friction: {basis.size} widths but {weights.size} weights; give as many of each")
-    reaches = np.cumsum(basis.widths) / 2
-    stiffness = weights - np.append(weights[1:], 0.0)
+    reaches = np.cumsum(model.basis.widths) / 2
+    stiffness = model.weights - np.append(model.weights[1:], 0.0)
     elements = [(float(k), float(r)) for k, r in zip(stiffness, reaches, strict=True) if k != 0.0]
     if not elements:
         raise ConfigError("friction: the identified model has no weight other than zero")

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, field_validator
+from pydantic import Discriminator, Field, Tag, field_validator
 
 from rtcomp import physics
 from rtcomp.errors import ConfigError
 from rtcomp.stage.identified import is_identified, stop_bank
-
-
-class Section(BaseModel):
-    """A section of a configuration: unknown keys are errors, text is no number, infinity is no value."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+from rtcomp.yamlfile import Section
 
 
 class Element(Section):
@@ -81,16 +76,8 @@ class Controller(Section):
 
 
 RUN_SECTIONS = (
-    "reference",
-    "duration",
-    "device",
-    "limits",
-    "identify",
-    "compensate",
-    "judge",
-    "recording",
-    "seed",
-)
+    "reference", "clock", "device", "limits", "identify", "judge", "compensate", "recording", "seed",
+)  # fmt: skip
 """What a run configuration holds beside its stage; reading it as a stage leaves these out."""
 
 

@@ -145,7 +145,7 @@ def _chain(file: StageFile) -> list[Effect]:
         chain.append(friction)
     chain += [physics.build(effect) for effect in m.effects]
     if file.sensor.noise:
-        chain.append(physics.build({"name": "sensor-noise", "noise": file.sensor.noise}))
+        chain.append(physics.build({"name": "sensor-noise", "rms": file.sensor.noise}))
     if file.sensor.resolution:
         chain.append(physics.build({"name": "sensor-resolution", "resolution": file.sensor.resolution}))
     return chain

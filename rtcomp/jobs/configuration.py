@@ -1,0 +1,227 @@
+"""A run configuration: a stage file, and beside it what to do with the stage."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from rtcomp.control.reference_settings import ReferenceSettings
+from rtcomp.control.references import Reference, build_reference, check
+from rtcomp.errors import ConfigError, LimitError
+from rtcomp.hysteresis import Basis, Learner, basis_named, build_learner
+from rtcomp.hysteresis.interval import IntervalBasis
+from rtcomp.stage.schema import StageFile
+from rtcomp.stage.stage import Stage
+from rtcomp.yamlfile import Section, YamlFile, load_yaml, validate
+
+Positive = Annotated[float, Field(gt=0)]
+Window = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class Limits(Section):
+    """The section ``limits``: beyond any of these the loop stops at zero volts, or does not start."""
+
+    travel: Window | None = Field(None, description="m, lowest and highest position")
+    speed: Positive | None = Field(None, description="m/s")
+    acceleration: Positive | None = Field(None, description="m/s^2, of references")
+    voltage: Positive | None = Field(None, description="V; at most the stage's voltage_limit")
+    slew: Positive | None = Field(None, description="V/s")
+
+    @field_validator("travel")
+    @classmethod
+    def _ordered(cls, value: list[float] | None) -> list[float] | None:
+        if value is not None and not value[0] < value[1]:
+            raise ValueError(f"travel is [{value[0]:g}, {value[1]:g}]; the lowest must come first")
+        return value
+
+
+class Identify(Section):
+    """The section ``identify``: the model and how it learns."""
+
+    model: str = Field("interval", description="basis: interval, stop, extended-stop, preisach")
+    intervals: int = Field(20, ge=1, le=100_000, description="number of elements")
+    range: Positive | None = Field(None, description="m, from full saturation to full saturation")
+    spacing: float = Field(1.0, ge=1e-3, le=1e3, description="last width over first")
+    widths: list[float] | None = Field(None, description="m, each interval, instead of the three above")
+    learner: dict[str, Any] = Field(
+        default_factory=lambda: {"learner": "rls", "forgetting": 0.9995},
+        description="learner and its settings",
+    )
+    smoothing: float = Field(0.0, ge=0, description="Hz, low-pass of position and force alike; 0 for none")
+    gate: float = Field(0.0, ge=0, description="m of motion between two updates")
+    offset: bool = Field(True, description="learn a constant force too")
+    prior: Literal["none", "non-increasing"] = Field("none", description="what is known of the virgin curve")
+    learn: Window | None = Field(None, description="s, when to learn; all of the run if not given")
+
+    @field_validator("model")
+    @classmethod
+    def _known_basis(cls, value: str) -> str:
+        basis_named(value)
+        return value
+
+    @field_validator("learner")
+    @classmethod
+    def _known_learner(cls, value: dict[str, Any]) -> dict[str, Any]:
+        build_learner(value)
+        return value
+
+    @field_validator("widths")
+    @classmethod
+    def _usable_widths(cls, value: list[float] | None) -> list[float] | None:
+        if value is not None:
+            IntervalBasis(value)
+        return value
+
+    @model_validator(mode="after")
+    def _one_way_to_say_where(self) -> Identify:
+        if self.widths is None and self.range is None:
+            raise ValueError("give range (m, from full saturation to full saturation) or widths")
+        if self.widths is not None and self.range is not None:
+            raise ValueError("range and widths are both given; the widths alone say where the intervals lie")
+        if self.prior != "none" and self.model != "interval":
+            raise ValueError(f"prior {self.prior!r} speaks of the interval model; model is {self.model!r}")
+        if self.learn is not None and not self.learn[0] < self.learn[1]:
+            raise ValueError(f"learn is [{self.learn[0]:g}, {self.learn[1]:g}] s; the start must come first")
+        return self
+
+
+class Judge(Section):
+    """The section ``judge``: the motion that frozen weights are judged on."""
+
+    reference: ReferenceSettings | None = Field(None, description="another motion of the stage")
+    window: Window | None = Field(None, description="s of a recording")
+    settle: float = Field(0.0, ge=0, description="s left out while the model's memory fills")
+
+
+class Compensate(Section):
+    """The section ``compensate``."""
+
+    reference: ReferenceSettings | None = Field(None, description="motion to compare on; else the first one")
+    settle: float = Field(1.0, ge=0, description="s at the start that the comparison leaves out")
+    learn: bool = Field(False, description="go on learning while compensating")
+
+
+class RecordingSection(Section):
+    """The section ``recording``: what to make of a recording given on the command line."""
+
+    map: dict[str, str] = Field(default_factory=dict, description="our column: the file's column")
+    rate: Positive | None = Field(None, description="Hz, to resample to; else the median rate")
+    delay_ticks: int = Field(0, ge=0, le=10, description="rows until a recorded command takes effect")
+
+
+class RunFile(StageFile):
+    """A whole run configuration."""
+
+    reference: ReferenceSettings | None = None
+    clock: Literal["virtual", "wall"] | None = Field(None, description="wall on links, virtual in simulation")
+    device: dict[str, Any] = Field(default_factory=lambda: {"driver": "simulated"})
+    limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
+    identify: Identify | None = None
+    judge: Judge = Field(default_factory=lambda: Judge.model_validate({}))
+    compensate: Compensate = Field(default_factory=lambda: Compensate.model_validate({}))
+    recording: RecordingSection = Field(default_factory=lambda: RecordingSection.model_validate({}))
+    seed: int = Field(0, ge=0, description="of the simulated noise")
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A checked run configuration with the objects it stands for."""
+
+    run: RunFile
+    stage: Stage
+    file: YamlFile
+
+    @classmethod
+    def load(cls, path: str | Path) -> Configuration:
+        """Read and check the file; raise ConfigError or LimitError in one line naming file, line and key."""
+        return cls.of(load_yaml(path))
+
+    @classmethod
+    def of(cls, file: YamlFile) -> Configuration:
+        """Check a configuration that has been read, or made."""
+        run = validate(RunFile, file)
+        stage_keys = set(StageFile.model_fields)
+        stage = Stage(StageFile.model_validate(run.model_dump(include=stage_keys, exclude_unset=True)))
+        limit = run.limits.voltage
+        if limit is not None and limit > stage.voltage_limit:
+            raise file.error(
+                ("limits", "voltage"),
+                f"is {limit:g} V; the stage's voltage_limit allows at most {stage.voltage_limit:g} V",
+            )
+        return cls(run, stage, file)
+
+    @property
+    def path(self) -> Path:
+        """Where it was read from."""
+        return self.file.path
+
+    @property
+    def period(self) -> float:
+        """Time between two ticks (s)."""
+        return 1.0 / self.stage.rate
+
+    @property
+    def voltage_limit(self) -> float:
+        """Largest command (V)."""
+        return self.run.limits.voltage or self.stage.voltage_limit
+
+    @property
+    def wall_clock(self) -> bool:
+        """Whether deadlines are real: unless told otherwise, on everything but simulation and replay."""
+        if self.run.clock is not None:
+            return self.run.clock == "wall"
+        return self.run.device.get("driver") not in ("simulated", "replay")
+
+    def reference(self, section: str = "") -> Reference:
+        """Return the reference of `section` (``judge``, ``compensate``), else the main one, checked."""
+        settings, key = None, "reference"
+        if section:
+            settings = getattr(self.run, section).reference
+            key = f"{section}.reference" if settings is not None else key
+        settings = settings or self.run.reference
+        if settings is None:
+            raise ConfigError(f"{self.path}: section reference is missing; say how the stage shall move")
+        reference = build_reference(settings, folder=self.path.parent)
+        try:
+            self._check(reference)
+        except LimitError as error:
+            line = self.file.line(tuple(key.split(".")))
+            raise LimitError(f"{self.path}:{line}: {key}: {error}") from error
+        return reference
+
+    def _check(self, reference: Reference) -> None:
+        limits, stage = self.run.limits, self.stage
+        strongest = self.voltage_limit * stage.force_constant / stage.mass
+        check(
+            reference,
+            stroke=None if limits.travel is None else (limits.travel[0], limits.travel[1]),
+            speed=limits.speed,
+            acceleration=min(limits.acceleration or math.inf, strongest),
+        )
+
+    def basis(self) -> Basis:
+        """Return the hysteresis basis that ``identify`` asks for."""
+        section = self.identify
+        if section.widths is not None:
+            return IntervalBasis(section.widths)
+        assert section.range is not None
+        return basis_named(section.model).over(section.intervals, section.range, section.spacing)
+
+    def learner(self) -> Learner:
+        """Return the learner that ``identify`` asks for."""
+        return build_learner(self.identify.learner)
+
+    @property
+    def identify(self) -> Identify:
+        """The section ``identify``; raises ConfigError where there is none."""
+        if self.run.identify is None:
+            raise ConfigError(f"{self.path}: section identify is missing; say at least identify.range (m)")
+        return self.run.identify
+
+    def changed(self, **sections: Any) -> Configuration:
+        """Return the configuration with whole top-level sections replaced."""
+        return Configuration.of(replace(self.file, data={**self.file.data, **sections}))

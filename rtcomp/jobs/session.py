@@ -1,0 +1,213 @@
+"""One run of the loop as a job makes it: device, tick, clock, ring and recorder, together."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import platform
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from rtcomp_drivers.driver import Bench
+from rtcomp_drivers.registry import create
+
+from rtcomp import __version__
+from rtcomp.control.limits import limit_state, limit_vector
+from rtcomp.control.pid import pid_state, pid_vector
+from rtcomp.errors import ConfigError
+from rtcomp.hysteresis.conditioning import low_pass
+from rtcomp.hysteresis.model import HysteresisModel
+from rtcomp.jobs.configuration import Configuration
+from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
+from rtcomp.kernels import Floats
+from rtcomp.loop.clock import VirtualClock, WallClock
+from rtcomp.loop.device import Device
+from rtcomp.loop.realtime import in_force, realtime_process
+from rtcomp.loop.ring import Ring
+from rtcomp.loop.run import Outcome, run, stop_on_signals
+from rtcomp.loop.tick import COLUMNS, Tick, TickSettings
+from rtcomp.recording.recorder import Recorder, RecorderSummary
+
+RING_SECONDS = 8.0
+"""How long the recorder may be held up before rows are lost."""
+WEIGHTS_EVERY = 0.1
+"""s between two stored sets of weights."""
+
+
+class Watch(Protocol):
+    """Somebody who looks at a run: told from inside in virtual time, from outside on a wall clock."""
+
+    def update(self, done: int, ticks: int, ring: Ring, columns: tuple[str, ...]) -> None:
+        """Look at the newest rows; called at most ten times a second."""
+
+    def attach(self, ring: Ring, columns: tuple[str, ...], ticks: int) -> AbstractContextManager[None]:
+        """Watch the ring from another process until the context ends."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run left: the recorded columns, the history of the weights, and how it went."""
+
+    columns: dict[str, Floats]
+    weights_time: Floats
+    """s, (M,)."""
+    weights: Floats
+    """(M, N + 1): the weights and the offset's weight, every `WEIGHTS_EVERY` seconds."""
+    outcome: Outcome
+    tick: Tick
+    delay_ticks: int
+    rate_hz: float
+    realtime: Mapping[str, str]
+    counters: Mapping[str, int] = field(default_factory=dict)
+    recorder: RecorderSummary | None = None
+
+    def tracking_error(self, settle: float = 0.0) -> Floats:
+        """Reference less position (m) after `settle` seconds."""
+        late = self.columns["time"] >= settle
+        return np.asarray((self.columns["reference"] - self.columns["position"])[late])
+
+
+def make_device(config: Configuration, recording: Any = None) -> Device:
+    """Build the configured device; it is not opened. Raises ConfigError."""
+    bench = Bench(config.stage, config.period, config.run.seed, config.wall_clock, recording)
+    settings = {"driver": "replay"} if recording is not None else config.run.device
+    given = recording is None and "device" in config.file.data
+    return create(settings, bench, config.file if given else None)
+
+
+def make_tick(
+    config: Configuration,
+    delay_ticks: int,
+    model: HysteresisModel | None = None,
+    *,
+    closed_loop: bool = True,
+) -> Tick:
+    """Put the tick together: the configured basis and learner, or a model's basis with its weights."""
+    section = config.run.identify
+    stage = config.stage
+    basis = model.basis if model is not None else config.basis()
+    learner = config.learner()
+    offset = section.offset if section is not None else True
+    controller = stage.controller
+    if closed_loop and controller is None:
+        raise ConfigError(f"{config.path}: section controller is missing; a reference needs one")
+    limits = config.run.limits
+    voltage = config.voltage_limit if closed_loop else 1e9
+    gains = (controller.kp, controller.ki, controller.kd) if controller is not None else (0.0, 0.0, 0.0)
+    travel = limits.travel if closed_loop and limits.travel is not None else [-np.inf, np.inf]
+    tick = Tick(
+        TickSettings(
+            period=config.period,
+            force_constant=stage.force_constant,
+            mass=stage.mass,
+            viscous=stage.mechanics.viscous,
+            gate=section.gate if section is not None else 0.0,
+            travel=(travel[0], travel[1]),
+            speed=(limits.speed or np.inf) * 10.0 if closed_loop else np.inf,
+            delay_ticks=delay_ticks,
+            closed_loop=closed_loop,
+        ),
+        basis,
+        learner,
+        sections=low_pass(section.smoothing if section is not None else 0.0, stage.rate),
+        pid=(pid_vector(*gains, period=config.period, voltage_limit=voltage), pid_state()),
+        limits=(limit_vector(voltage, config.period, limits.slew or np.inf), limit_state()),
+        learn_offset=offset,
+    )
+    if model is not None:
+        tick.weights[:-1] = model.weights
+        tick.weights[-1] = model.offset / tick.offset_scale if tick.offset_scale else 0.0
+    return tick
+
+
+def run_loop(
+    config: Configuration,
+    plan: ReferencePlan | VoltagePlan,
+    device: Device,
+    tick: Tick,
+    *,
+    path: Path | None = None,
+    watch: Watch | None = None,
+    metadata: Mapping[str, Any] | None = None,
+) -> Run:
+    """Run the loop once; record to `path` (HDF5) where one is given, in memory where not.
+
+    Raises what the loop raises (DeviceError, LimitError); the recording up to there is kept.
+    """
+    wall = config.wall_clock and tick.closed_loop
+    columns = tuple(COLUMNS)
+    capacity = plan.ticks if path is None else max(4096, int(RING_SECONDS * config.stage.rate))
+    ring = Ring.create(capacity, tick.row_width)
+    recorder: Recorder | None = None
+    in_loop = in_force()
+    try:
+        with contextlib.ExitStack() as stack:
+            if path is not None:
+                about = describe(config, tick, metadata)
+                recorder = Recorder.start(
+                    path, ring, columns, about, weights_columns=tick.weights.size, axis=config.stage.axis
+                )
+            stop = stack.enter_context(stop_on_signals())
+            if wall and watch is not None:
+                stack.enter_context(watch.attach(ring, columns, plan.ticks))
+            if wall:
+                in_loop = stack.enter_context(realtime_process())
+            outcome = run(
+                device,
+                tick,
+                plan,
+                WallClock() if wall else VirtualClock(),
+                ring,
+                stop=stop,
+                progress=None if watch is None else lambda n, _: watch.update(n, plan.ticks, ring, columns),
+                recorder_alive=None if recorder is None else lambda: recorder.alive,
+            )
+    finally:
+        summary = recorder.finish() if recorder is not None else None
+        if path is None:
+            rows = ring.take()
+        ring.release()
+    counters = dict(getattr(device, "counters", {}))
+    delay = device.delay_ticks
+    if path is None:
+        every = max(1, round(WEIGHTS_EVERY * config.stage.rate))
+        recorded = {name: rows[:, j].copy() for j, name in enumerate(columns)}
+        history = rows[every - 1 :: every]
+        return Run(
+            recorded, history[:, 0].copy(), history[:, len(columns) :].copy(), outcome, tick, delay,
+            config.stage.rate, in_loop, counters,
+        )  # fmt: skip
+    recorded, times, weights = read_back(path, columns)
+    return Run(recorded, times, weights, outcome, tick, delay, config.stage.rate, in_loop, counters, summary)
+
+
+def read_back(path: Path, columns: tuple[str, ...]) -> tuple[dict[str, Floats], Floats, Floats]:
+    """Read the columns and the weights' history of one of our own recordings, finished or not."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        recorded = {name: file[name][:] for name in columns}
+        return recorded, file["weights/time"][:], file["weights/weights"][:]
+
+
+def describe(config: Configuration, tick: Tick, more: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Return the metadata of a recording: what ran, on what, as what."""
+    import numba
+
+    return {
+        "rate_hz": config.stage.rate,
+        "configuration": json.dumps(config.run.model_dump(mode="json", exclude_none=True)),
+        "stage": json.dumps(config.stage.to_dict()),
+        "clock": "wall" if config.wall_clock else "virtual",
+        "delay_ticks": int(tick.delay_ticks),
+        "rtcomp_version": __version__,
+        "python_version": platform.python_version(),
+        "numpy_version": np.__version__,
+        "numba_version": numba.__version__,
+        "machine": platform.platform(),
+        **(more or {}),
+    }
