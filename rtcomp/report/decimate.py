@@ -11,6 +11,9 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 
+_MEASURED_ROWS = 200_000
+"""Rows at most on which a path's length is measured; longer ones by their peaks."""
+
 
 def _keep(columns: Sequence[Floats], edges: Indices) -> Indices:
     """Return the indices of the ends and, per bucket, of each column's extremes and of the first gap."""
@@ -63,29 +66,45 @@ def peak_indices(columns: Sequence[Floats], points: int) -> Indices:
     return _keep(columns, np.linspace(0, rows, buckets + 1).astype(np.intp))
 
 
-def path_indices(columns: Sequence[Floats], points: int, coarsest: float = 0.03) -> Indices:
+def path_indices(columns: Sequence[Floats], points: int, coarsest: float = 0.05) -> Indices:
     """Return at most `points` indices, ascending, that draw a path (a loop), first column against the others.
 
     Buckets are equal in length along the path, not in rows, each axis in units of its range, so that a
-    reversal is kept as well as the slow middle. Where a bucket would be longer than `coarsest` a path no
-    longer looks like itself (chords across loops); then only the last stretch that can be drawn faithfully is
-    returned: the first index says where it begins. Raises ValueError as `peak_indices`.
+    reversal is kept as well as the slow middle. Wiggles below a fifth of `coarsest` (noise) count no length.
+    Where a bucket would be longer than `coarsest` a path no longer looks like itself (chords across loops);
+    then only the last stretch that can be drawn faithfully is returned: the first index says where it begins.
+    Raises ValueError as `peak_indices`.
     """
     buckets = _buckets(columns, points)
     rows = len(columns[0])
     if rows <= points:
         return np.arange(rows, dtype=np.intp)
-    square = np.zeros(rows - 1)
+    some = peak_indices(columns, max(_MEASURED_ROWS, points))
+    square = np.zeros(len(some) - 1)
     for column in columns:
-        finite = column[np.isfinite(column)]
+        piece = column[some]
+        finite = piece[np.isfinite(piece)]
         spread = float(np.ptp(finite)) if finite.size else 0.0
-        if spread > 0.0:
-            step = np.diff(column) / spread
-            square += np.where(np.isfinite(step), step, 0.0) ** 2
+        if 0.0 < spread < np.inf:
+            square += np.diff(_without_wiggles(piece / spread, coarsest / 5.0)) ** 2
     length = np.concatenate(([0.0], np.cumsum(np.sqrt(square))))
     start = max(0.0, float(length[-1]) - buckets * coarsest)
-    edges = np.searchsorted(length, np.linspace(start, float(length[-1]), buckets + 1))
+    edges = some[np.searchsorted(length, np.linspace(start, float(length[-1]), buckets + 1))]
     edges[-1] = rows
     if start == 0.0:
         edges[0] = 0
-    return _keep(columns, np.maximum.accumulate(edges).astype(np.intp))
+    return _keep(columns, np.maximum.accumulate(edges))
+
+
+def _without_wiggles(column: Floats, reach: float) -> Floats:
+    """Return the play of half-width `reach` driven by `column`; what is not finite moves nothing."""
+    finite = column[np.isfinite(column)]
+    at = float(finite[0]) if finite.size else 0.0
+    followed = []
+    for value in column.tolist():
+        if value > at + reach:
+            at = value - reach if value < np.inf else at
+        elif value < at - reach:
+            at = value + reach if value > -np.inf else at
+        followed.append(at)
+    return np.array(followed)

@@ -19,6 +19,7 @@ from rtcomp.report.figures import (
     Figures,
     error_bars_figure,
     execution_figure,
+    first_reversal,
     force_figure,
     lateness_figure,
     learning_figure,
@@ -187,6 +188,31 @@ def test_the_virgin_part_of_a_loop_is_a_line_of_its_own_that_joins_the_rest() ->
     assert (virgin.x[-1], virgin.y[-1]) == (rest.x[0], rest.y[0])
     assert virgin.x[0] == 0.0 and rest.x[-1] == -1.0
     assert virgin.mode == rest.mode == "lines"
+
+
+@given(st.integers(20, 400), st.sampled_from([-1.0, 1.0]), st.integers(0, 2**32 - 1))
+@settings(max_examples=30, deadline=None)
+def test_the_first_reversal_is_found_through_noise(rows: int, way: float, seed: int) -> None:
+    rest = np.zeros(rows // 4)
+    motion = np.concatenate((rest, np.linspace(0, 1, rows), np.linspace(1, -1, 2 * rows)[1:]))
+    noise = 2e-3 * np.random.default_rng(seed).uniform(-1, 1, motion.size)
+    true = rest.size + rows
+    assert first_reversal(way * motion) == true
+    assert abs(first_reversal(way * (motion + noise)) - true) <= 1 + rows // 100
+
+
+@pytest.mark.parametrize(
+    "motion", [[], [1.0], [1.0, 1.0, 1.0], [0.0, 1.0, 2.0, 3.0], [0.0, np.nan, 1.0, 0.0]]
+)
+def test_motion_that_never_turns_back_has_no_virgin_part(motion: list[float]) -> None:
+    assert first_reversal(motion) == 0
+
+
+def test_a_noisy_loop_is_drawn_whole_and_not_cut_for_its_noise() -> None:
+    t = np.arange(9000) * 1e-3
+    x = np.exp(-t / 6) * np.sin(5 * t)
+    noisy = x + 3e-3 * np.random.default_rng(2).standard_normal(t.size)
+    assert not any("last" in note for note in loop_figure(x, noisy, x).layout.meta["notes"])
 
 
 def test_a_long_loop_says_that_only_its_end_is_drawn() -> None:

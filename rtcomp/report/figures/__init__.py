@@ -1,6 +1,6 @@
 """Figures: pure functions from arrays to plotly figures, a family a file."""
 
-from rtcomp.report.figures.hysteresis import loop_figure, virgin_curve, virgin_figure
+from rtcomp.report.figures.hysteresis import first_reversal, loop_figure, virgin_curve, virgin_figure
 from rtcomp.report.figures.learning import Curve, learning_figure, overlay_figure
 from rtcomp.report.figures.motion import force_figure, position_figure
 from rtcomp.report.figures.timing import execution_figure, lateness_figure
@@ -11,6 +11,7 @@ __all__ = [
     "Figures",
     "error_bars_figure",
     "execution_figure",
+    "first_reversal",
     "force_figure",
     "lateness_figure",
     "learning_figure",

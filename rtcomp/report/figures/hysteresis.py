@@ -56,21 +56,38 @@ def loop_figure(
     for rank, (name, y) in enumerate(given.items()):
         colour, width, opacity = look[name]
         for rows, first in parts:
+            called, thick, dash = (f"{name}, virgin", 0.6 * width, "dot") if first else (name, width, "solid")
             c.line(
-                figure, x[rows] * along.factor, y[rows] * up.factor, f"{name}, virgin" if first else name,
-                colour, width=width, dash="dot" if first else "solid", opacity=opacity,
-                legendrank=10 * int(first) + rank, hovertemplate=where,
+                figure, x[rows] * along.factor, y[rows] * up.factor, called, colour, width=thick, dash=dash,
+                opacity=opacity, legendrank=10 * int(first) + rank, hovertemplate=where,
             )  # fmt: skip
     figure.update_xaxes(range=c.padded(x * along.factor))
     if held_out_percent is not None:
         c.note(figure, f"Held-out error {si(held_out_percent, '%')} of the peak force, weights frozen.")
     if kept.size and kept[0] > rest:
-        c.note(
-            figure, f"Drawn: the last {len(x) - int(kept[0])} of {len(x)} samples; more would be unreadable."
-        )
+        c.note(figure, f"Drawn: the last {len(x) - int(kept[0])} of {len(x)} samples; more is unreadable.")
     elif sum(len(rows) for rows, _ in parts) < len(x):
         c.note(figure, "Drawn with fewer points than samples, all reversals and peaks kept.")
     return figure
+
+
+def first_reversal(position: npt.ArrayLike, back: float = 0.02) -> int:
+    """Return how many rows go by until motion first turns back: `virgin_rows` of a run from rest.
+
+    A reversal is one of at least `back` of the motion's range, so that noise is none. Returns 0 where the
+    motion never turns back or where a position is not finite.
+    """
+    x = c.floats(position)
+    if x.size == 0 or not np.isfinite(x).all():
+        return 0
+    least = back * float(np.ptp(x))
+    moved = np.flatnonzero(np.abs(x - x[0]) > least)
+    if moved.size == 0:
+        return 0
+    way = float(np.sign(x[moved[0]] - x[0])) * x
+    turned = np.flatnonzero(np.maximum.accumulate(way) - way > least)
+    turned = turned[turned > moved[0]]
+    return int(np.argmax(way[: turned[0]])) + 1 if turned.size else 0
 
 
 def virgin_curve(widths: npt.ArrayLike, weights: npt.ArrayLike) -> tuple[Floats, Floats]:
