@@ -266,7 +266,7 @@ acts = st.one_of(
 )
 
 
-@settings(max_examples=150)
+@settings(deadline=None, max_examples=150)
 @given(st.lists(acts, max_size=60))
 def test_whatever_a_host_does_the_output_is_zero_unless_armed_and_fed(script):
     """Judged by what the plant got, against a model of three lines: who was armed, when fed, with what."""

@@ -49,6 +49,7 @@ def line(sent: list[protocol.Command]) -> bytes:
     return b"".join(encode(m) for m in sent)
 
 
+@settings(deadline=None)
 @given(messages)
 def test_what_is_encoded_is_decoded(message):
     decoder = Decoder()
@@ -58,6 +59,7 @@ def test_what_is_encoded_is_decoded(message):
     assert (decoder.good, decoder.bad, decoder.unknown) == (1, 0, 0)
 
 
+@settings(deadline=None)
 @given(st.binary(min_size=1, max_size=protocol.MAX_PAYLOAD))
 def test_a_frame_holds_one_zero_and_little_overhead(payload):
     frame = protocol.frame(payload)
@@ -67,11 +69,13 @@ def test_a_frame_holds_one_zero_and_little_overhead(payload):
     assert protocol.payload_of(frame[:-1]) == payload
 
 
+@settings(deadline=None)
 @given(u32, i32)
 def test_the_quick_way_to_encode_a_command_is_the_same(sequence, microvolts):
     assert protocol.encode_command(sequence, microvolts) == encode(protocol.Command(sequence, microvolts))
 
 
+@settings(deadline=None)
 @given(st.lists(messages, max_size=8), st.lists(st.integers(0, 400), max_size=12))
 def test_where_the_bytes_are_split_does_not_matter(sent, cuts):
     data = b"".join(encode(m) for m in sent)
@@ -83,6 +87,7 @@ def test_where_the_bytes_are_split_does_not_matter(sent, cuts):
     assert decoder.bad == 0
 
 
+@settings(deadline=None)
 @given(messages, st.data())
 def test_no_frame_with_flipped_bits_is_accepted(message, data):
     frame = encode(message)
@@ -96,7 +101,7 @@ def test_no_frame_with_flipped_bits_is_accepted(message, data):
     assert decoder.bad >= 1
 
 
-@settings(max_examples=200)
+@settings(deadline=None, max_examples=200)
 @given(st.binary(max_size=600), st.integers(1, 64))
 def test_after_any_garbage_it_is_in_step_within_two_frames(garbage, piece):
     sent = numbered(7, 4)
@@ -108,6 +113,7 @@ def test_after_any_garbage_it_is_in_step_within_two_frames(garbage, piece):
         assert decoder.bad >= 1
 
 
+@settings(deadline=None)
 @given(st.integers(0, 4), st.integers(0, 20), st.integers(0, 20))
 def test_lost_bytes_cost_the_frames_that_they_touch_and_no_more(which, start, length):
     sent = numbered(1, 8)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from rtcomp_drivers.quality import LEAST, SHARE, WINDOW_S, LinkQuality
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.booleans(), st.floats(0.0, 0.05)), max_size=400))
 def test_it_never_fails_where_any_longer_stretch_is_good(frames):
     """Where no half second holds five bad frames, the link is good, however the good ones fall."""
