@@ -126,6 +126,13 @@ def test_stops_keep_to_their_reach_and_follow_the_recursion(u):
         assert np.allclose(out[k], z, rtol=0, atol=1e-12)
 
 
+def test_spread_alike_stops_and_intervals_have_their_corners_in_the_same_places():
+    intervals, stops = IntervalBasis.over(9, 3e-5, 8.0), StopBasis.over(9, 3e-5, 8.0)
+    assert np.allclose(np.cumsum(intervals.widths) / 2, stops.reaches, rtol=1e-12)
+    assert ExtendedStopBasis.over(9, 3e-5).size == 9
+    assert PreisachBasis.over(20, 2.0).divisions == 5 and PreisachBasis.over(21, 2.0).divisions == 6
+
+
 def test_extended_stops_go_on_rising_after_yielding():
     basis = ExtendedStopBasis([0.1, 0.2])
     out = regressors(basis, np.array([2.0, 2.05, 3.0, 4.0]))
@@ -232,6 +239,7 @@ def test_preisach_rounding_does_not_add_up():
         (lambda: PreisachBasis(0, 1.0), "divisions is 0"),
         (lambda: PreisachBasis(201, 1.0), "divisions is 201"),
         (lambda: PreisachBasis(3, -1.0), "reach is -1 m"),
+        (lambda: PreisachBasis.over(20, 1.0, spacing=3.0), "spacing is 3"),
         (lambda: PreisachBasis.from_dict({"reach": 1.0}), "'divisions' and 'reach'"),
     ],
 )
