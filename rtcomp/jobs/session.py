@@ -166,6 +166,8 @@ def run_loop(
                 progress=None if watch is None else lambda n, _: watch.update(n, plan.ticks, ring, columns),
                 recorder_alive=None if recorder is None else lambda: recorder.alive,
             )
+            if not wall and watch is not None:
+                watch.update(plan.ticks, plan.ticks, ring, columns)
     finally:
         summary = recorder.finish() if recorder is not None else None
         if path is None:

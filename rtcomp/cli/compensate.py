@@ -1,0 +1,65 @@
+"""`rtcomp compensate`: follow a reference with the friction cancelled, beside the same without."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from rtcomp.cli.options import json_option, output_options, prepare_output
+from rtcomp.cli.runs import device_options, finish, load
+
+
+@click.command()
+@click.argument("config", type=click.Path(path_type=Path))
+@click.option(
+    "--model", type=click.Path(path_type=Path), help="Model file of `rtcomp identify`; else identified first."
+)
+@output_options("out/compensate")
+@device_options
+@click.option("--seconds", type=click.FloatRange(0.1, 1e6), help="Length of each run, instead of the file's.")
+@json_option
+def compensate(
+    config: Path,
+    model: Path | None,
+    out: Path,
+    force: bool,
+    port: str | None,
+    clock: str | None,
+    seconds: float | None,
+    as_json: bool,
+) -> None:
+    """Follow the reference in CONFIG twice, without and with feedforward of the friction.
+
+    The folder holds without.h5 and with.h5, the model, the configuration as run, summary.json and
+    report.html.
+
+    \b
+    Examples:
+      rtcomp compensate configs/leuven.yaml --model out/leuven/model.yaml --out out/tracking
+      rtcomp compensate configs/leuven.yaml --port /dev/ttyACM0 --model out/board/model.yaml
+    """
+    from rtcomp.hysteresis.model import HysteresisModel
+    from rtcomp.jobs.compensate import compensate as run
+    from rtcomp.jobs.identify import identify
+    from rtcomp.report.pages import compensated_page, compensated_rows
+    from rtcomp.report.watch import TerminalWatch
+    from rtcomp.units import for_axis
+
+    chosen = load(config, port=port, clock=clock, seconds=seconds)
+    chosen.reference("compensate")
+    known = HysteresisModel.load(model) if model is not None else None
+    with prepare_output(out, force) as work:
+        titles = ["without", "with"] if known is not None else ["learn", "judge", "without", "with"]
+        watch = TerminalWatch(titles, quiet=as_json, unit=for_axis("m", chosen.stage.axis))
+        try:
+            if known is None:
+                known = identify(chosen, out=work, watch=watch).model
+            done = run(chosen, known, out=work, watch=watch)
+        finally:
+            watch.close()
+        done.model.save(work / "model.yaml")
+        finish(
+            out, work, chosen, "compensated", compensated_rows(done), done.summary(), compensated_page(done),
+            as_json,
+        )  # fmt: skip

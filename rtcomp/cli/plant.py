@@ -1,0 +1,35 @@
+"""`rtcomp plant`: stand in for hardware."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.group()
+def plant() -> None:
+    """Stand in for hardware: a simulated stage in its own process, in real time, behind a port."""
+
+
+@plant.command()
+@click.option("--config", required=True, type=click.Path(path_type=Path), help="Stage file or configuration.")
+@click.option("--serial", "link", flag_value="serial", default="serial", help="Speak the serial protocol.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the simulated noise.")
+@click.option("--json", "as_json", is_flag=True, help="Print the port as JSON.")
+@click.option("--log", type=click.Path(path_type=Path), help="File for the summary at exit, else stderr.")
+def serve(config: Path, link: str, seed: int, as_json: bool, log: Path | None) -> None:
+    """Serve the stage in CONFIG behind a pty and print the port to use; ends with Ctrl-C.
+
+    It has the watchdog that a board has: without commands for the time set at arming, its output goes to
+    zero and it has to be armed anew.
+
+    \b
+    Example:
+      rtcomp plant serve --config configs/leuven.yaml --serial
+    """
+    from rtcomp_drivers.plant_server import serve as run
+
+    from rtcomp.stage.stage import Stage
+
+    run(Stage.load(config), link=link, seed=seed, as_json=as_json, log=log)
