@@ -110,9 +110,10 @@ def scale(unit: str, *values: npt.ArrayLike) -> Scale:
     largest = 0.0
     for one in values:
         array = np.asarray(one, dtype=np.float64)
-        finite = array[np.isfinite(array)]
-        if finite.size:
-            largest = max(largest, float(np.max(finite)), -float(np.min(finite)))
+        if array.size and not np.isfinite([array.min(), array.max()]).all():
+            array = array[np.isfinite(array)]
+        if array.size:
+            largest = max(largest, float(array.max()), -float(array.min()))
     if largest == 0.0:
         return Scale(1.0, unit)
     chosen = _exponent_for(largest, exponent, base)

@@ -113,13 +113,13 @@ def padded(values: Floats, share: float = 0.03) -> list[float]:
     return [low - room, high + room]
 
 
-def logarithmic(low: float, high: float, *, room: float = 0.06) -> dict[str, Any]:
-    """Return the layout of a log axis from `low` to `high` (both > 0), ticks written as plain numbers."""
+def logarithmic(low: float, high: float, *, room: float = 0.06, least: float = 0.0) -> dict[str, Any]:
+    """Return the layout of a log axis from `low` to `high` (> 0), ticks (from `least`) as plain numbers."""
     bottom, top = float(np.log10(low)), float(np.log10(high))
     span = max(top - bottom, 0.3)
     steps = (1, 2, 5) if span <= 2.5 else (1,)
     decades = range(int(np.floor(bottom)) - 1, int(np.ceil(top)) + 2)
-    ticks = [m * 10.0**k for k in decades for m in steps]
+    ticks = [m * 10.0**k for k in decades for m in steps if m * 10.0**k >= least]
     return {
         "type": "log",
         "range": [bottom - room * span, top + room * span],

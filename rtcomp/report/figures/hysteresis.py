@@ -11,7 +11,7 @@ from rtcomp.report.decimate import Floats, Indices, path_indices
 from rtcomp.report.figures import canvas as c
 from rtcomp.report.quantities import scale, si, typeset, written
 
-_STEMS = 400
+_STEMS = 120
 """Interval boundaries drawn at most; more would be a grey area."""
 
 

@@ -11,7 +11,7 @@ from rtcomp.report.figures import canvas as c
 from rtcomp.report.quantities import scale, written
 
 _BINS = 90
-_QUANTILES = (("p50", 50.0), ("p99", 99.0), ("p99.9", 99.9), ("max", 100.0))
+_QUANTILES = {"p50": 50.0, "p99": 99.0, "p99.9": 99.9, "max": 100.0}
 
 
 def _histogram(values: npt.ArrayLike, title: str, limit_us: float | None, limit_name: str) -> go.Figure:
@@ -24,7 +24,8 @@ def _histogram(values: npt.ArrayLike, title: str, limit_us: float | None, limit_
     low, high = float(us.min()), float(us.max())
     if limit_us is not None:
         high = max(high, limit_us)
-    middle = float(np.percentile(us, 50.0))
+    foot, *quantiles = (float(q) for q in np.percentile(us, [0.1, *_QUANTILES.values()]))
+    middle = quantiles[0]
     # A far tail squeezes everything else into one linear bin; then the axis is logarithmic.
     log_x = low >= 0.0 and middle > 0.0 and high > 30.0 * middle
     shown = scale("us", middle) if log_x else scale("us", us, high)
@@ -32,7 +33,7 @@ def _histogram(values: npt.ArrayLike, title: str, limit_us: float | None, limit_
     figure.update_layout(showlegend=False, margin={"t": 80})
     floor = low
     if log_x:
-        floor = max(low, min(middle, float(np.percentile(us, 0.1))) / 3.0, high * 1e-7)
+        floor = max(low, min(middle, foot) / 3.0, high * 1e-7)
         edges = np.geomspace(floor, high * 1.02, _BINS + 1)
         us_binned = np.maximum(us, floor)
     else:
@@ -50,7 +51,7 @@ def _histogram(values: npt.ArrayLike, title: str, limit_us: float | None, limit_
         x=c.compact(x), y=c.compact(y), mode="lines", line={"color": palette.MEASURED, "width": 1.4},
         fill="tozeroy", name="ticks", hoverinfo="skip",
     )  # fmt: skip
-    marks = [(name, float(np.percentile(us, q)), palette.INK) for name, q in _QUANTILES]
+    marks = [(name, value, palette.INK) for name, value in zip(_QUANTILES, quantiles, strict=True)]
     if limit_us is not None:
         marks.append((limit_name, limit_us, palette.WITHOUT))
     right = np.log10(edges[-1] / edges[0]) if log_x else edges[-1] - edges[0]
@@ -69,7 +70,9 @@ def _histogram(values: npt.ArrayLike, title: str, limit_us: float | None, limit_
             xanchor="left" if share < 0.6 else "right", yanchor="top", xshift=3 if share < 0.6 else -3,
             font={"size": 12, "color": colour},
         )  # fmt: skip
-    figure.update_yaxes(c.logarithmic(0.5, max(float(counts.max()), 2.0) * 1.5, room=0.0), title_standoff=8)
+    figure.update_yaxes(
+        c.logarithmic(0.5, max(float(counts.max()), 2.0) * 1.5, room=0.0, least=1.0), title_standoff=8
+    )
     if log_x:
         figure.update_xaxes(c.logarithmic(float(edges[0]), float(edges[-1]), room=0.0))
     c.note(figure, f"{us.size} ticks.")
