@@ -27,7 +27,7 @@ from typing import Final
 import numpy as np
 
 from rtcomp.kernels import Floats, effect_kernel
-from rtcomp.physics.approach import LONGEST, SHARPNESS, STEPS, advance, flow
+from rtcomp.physics.approach import SHARPNESS, STEPS, advance, flow, longest
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Parameter, Place
 from rtcomp.physics.level import LEVEL, VISCOUS, stribeck_level
@@ -54,6 +54,7 @@ def leuven(p: Floats, s: Floats, w: Floats) -> None:
     v = w[VELOCITY]
     n = p[4]
     level = stribeck_level(p[0], p[1], p[2], p[3], v) * w[REACH]
+    cut = longest(n)
     left = abs(w[MOVED])
     if left > 0.0:
         direction = math.copysign(1.0, w[MOVED])
@@ -92,8 +93,8 @@ def leuven(p: Floats, s: Floats, w: Floats) -> None:
                 break
             h = left * slope / span
             steps += 1
-            if h > LONGEST and steps < STEPS:
-                h = LONGEST
+            if h > cut and steps < STEPS:
+                h = cut
             new = advance(q, n, h) * span
             event = min(corner, opposite - start)
             if new > event > done and steps < STEPS:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats, effect_kernel
-from rtcomp.physics.approach import LONGEST, SHARPNESS, STEPS, advance, flow
+from rtcomp.physics.approach import SHARPNESS, STEPS, advance, flow, longest
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Parameter, Place
 from rtcomp.physics.level import LEVEL, VISCOUS, stribeck_level
@@ -32,6 +32,7 @@ def modified_leuven(p: Floats, s: Floats, w: Floats) -> None:
     count = int(p[7])
     widen = w[REACH]
     level = stribeck_level(p[0], p[1], p[2], p[3], v) * widen
+    cut = longest(n)
     left = abs(w[MOVED])
     direction = math.copysign(1.0, w[MOVED])
     steps = 0
@@ -55,8 +56,8 @@ def modified_leuven(p: Floats, s: Floats, w: Floats) -> None:
             break
         h = left * stiffness / level
         steps += 1
-        if h > LONGEST and steps < STEPS:
-            h = LONGEST
+        if h > cut and steps < STEPS:
+            h = cut
             left -= h * level / stiffness
         else:
             left = 0.0

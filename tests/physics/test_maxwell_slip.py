@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -44,7 +46,9 @@ def test_wiping_out_a_closed_inner_loop_leaves_nothing(path, inner):
     outer = [high, low - 1e-6]
     loop = [low - 1e-6 + f * (high - low) for f in inner]
     after = [low - 1e-6, low - 3e-6, high]
-    assert force([*path, *outer, *loop, *after])[-1] == pytest.approx(force([*path, *outer, *after])[-1], abs=1e-9)
+    assert force([*path, *outer, *loop, *after])[-1] == pytest.approx(
+        force([*path, *outer, *after])[-1], abs=1e-9
+    )
 
 
 @given(one=PATHS, other=PATHS, low=st.floats(-4e-6, 0), size=st.floats(0.2e-6, 4e-6))
@@ -57,7 +61,7 @@ def test_congruency_loops_between_the_same_turning_points_have_the_same_shape(on
 @given(path=PATHS)
 def test_a_closed_loop_dissipates(path):
     corners = np.array([*path, *path, path[0]])
-    fine = np.concatenate([np.linspace(a, b, 40)[1:] for a, b in zip(corners[:-1], corners[1:], strict=True)])
+    fine = np.concatenate([np.linspace(a, b, 40)[1:] for a, b in pairwise(corners)])
     f = force([path[0], *fine])
     x = np.concatenate([[path[0]], fine])
     start = len(fine) // 2 if len(path) > 1 else 0  # the second turn: closed in state as well
@@ -73,11 +77,7 @@ def test_rate_independent(path, factor):
 @given(path=PATHS, pieces=st.integers(2, 30))
 def test_splitting_a_displacement_changes_nothing(path, pieces):
     corners = [0.0, *path]
-    fine = [
-        a + (b - a) * (j + 1) / pieces
-        for a, b in zip(corners[:-1], corners[1:], strict=True)
-        for j in range(pieces)
-    ]
+    fine = [a + (b - a) * (j + 1) / pieces for a, b in pairwise(corners) for j in range(pieces)]
     np.testing.assert_allclose(force(fine)[pieces - 1 :: pieces], force(path), atol=1e-9)
 
 
@@ -115,7 +115,10 @@ def test_holds_at_rest():
     [
         ([], "empty"),
         ([{"stiffness": 1e5}], r"friction\[0\].*'reach' \(m\) is missing"),
-        ([{"stiffness": 1e5, "reach": 1e-6}, {"stiffness": 1e5, "reach": 0.0}], r"friction\[1\]: reach is 0 m"),
+        (
+            [{"stiffness": 1e5, "reach": 1e-6}, {"stiffness": 1e5, "reach": 0.0}],
+            r"friction\[1\]: reach is 0 m",
+        ),
         ([{"stiffness": 1e5, "reach": 1e-6, "stifness": 1}], "unknown parameter 'stifness'"),
         ([{"stiffness": "soft", "reach": 1e-6}], "'soft'; it must be a number"),
         ([7], r"friction\[0\] is 7"),
