@@ -155,14 +155,20 @@ def test_the_summary_accounts_for_every_frame(plant):
     assert summary["scheduling"] == plant.scheduling
 
 
-def test_a_stopped_server_skips_the_time_it_was_not_there(plant):
-    with connect(plant) as device:
-        before = device.exchange(0.0)
+def test_a_server_that_was_stopped_has_its_watchdog_act_all_the_same(plant):
+    """A board's timer does not stop with its processor: the output was zero long before anybody looked."""
+    with connect(plant, watchdog=WATCHDOG_S) as device:
+        device.exchange(1.0)
         os.kill(plant.pid, signal.SIGSTOP)
         time.sleep(0.5)
         os.kill(plant.pid, signal.SIGCONT)
-        after = device.exchange(0.0)
-    assert after.time > before.time
+        time.sleep(WATCHDOG_S + SLACK_S)
+        with pytest.raises(DeviceError, match="FAULT"):
+            for _ in range(20):
+                device.exchange(1.0)
+    (zeroing,) = plant.stop()["zeroings"]
+    assert zeroing["cause"] == "watchdog"
+    assert zeroing["since_command"] == pytest.approx(WATCHDOG_S, abs=1e-6)
 
 
 def test_a_stage_too_stiff_for_real_time_says_so_and_still_obeys(tmp_path):

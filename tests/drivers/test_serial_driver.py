@@ -219,7 +219,7 @@ def test_a_command_that_no_board_can_take_is_not_sent(pty_board):
 
 def test_a_missing_sample_is_the_last_one_again_and_too_many_are_an_error(pty_board):
     board = pty_board()
-    with serial(board.port, reply_timeout=0.01, max_missed=3, watchdog=1.0) as device:
+    with serial(board.port, reply_timeout=0.05, max_missed=3, watchdog=1.0) as device:
         good = device.exchange(0.0)
         board.to_host = lambda _: b""
         for _ in range(3):
@@ -232,7 +232,7 @@ def test_a_missing_sample_is_the_last_one_again_and_too_many_are_an_error(pty_bo
 
 def test_after_a_pause_of_the_line_samples_are_fresh_again(pty_board):
     board = pty_board()
-    with serial(board.port, reply_timeout=0.02, watchdog=1.0) as device:
+    with serial(board.port, reply_timeout=0.05, watchdog=1.0) as device:
         device.exchange(0.0)
         board.to_board = lambda _: b""
         assert device.exchange(0.0).status == STALE
@@ -252,7 +252,7 @@ def test_a_late_sample_is_used_as_a_stale_one(pty_board):
         held.append(data)
         return held.pop(0) if len(held) > 1 else b""
 
-    with serial(board.port, reply_timeout=0.02, watchdog=1.0) as device:
+    with serial(board.port, reply_timeout=0.05, watchdog=1.0) as device:
         device.exchange(0.0)
         board.to_host = late
         samples = [device.exchange(1.0) for _ in range(10)]
@@ -326,7 +326,7 @@ def test_a_line_with_many_damaged_frames_is_an_error(pty_board):
 
 def test_a_board_whose_clock_stands_gives_nothing_new(pty_board):
     board = pty_board()
-    with serial(board.port, reply_timeout=0.01, max_missed=2, watchdog=1.0) as device:
+    with serial(board.port, reply_timeout=0.05, max_missed=2, watchdog=1.0) as device:
         device.exchange(0.5)
         stands = time.monotonic()
         board.clock = lambda: stands
