@@ -30,7 +30,15 @@ COLUMN_UNITS: dict[str, str] = {
 }
 """Unit of each column that the program writes; columns not listed have unit ``"1"``."""
 
-_ROTARY = {"m": "rad", "N": "N m", "kg": "kg m^2", "m/s": "rad/s", "N/m": "N m/rad", "N s/m": "N m s/rad", "N/V": "N m/V"}
+_ROTARY = {
+    "m": "rad",
+    "N": "N m",
+    "kg": "kg m^2",
+    "m/s": "rad/s",
+    "N/m": "N m/rad",
+    "N s/m": "N m s/rad",
+    "N/V": "N m/V",
+}
 
 
 def for_axis(unit: str, axis: str) -> str:

@@ -35,6 +35,10 @@ class Bench:
     """s, from one exchange to the next."""
     seed: int = 0
     """For noise, where the driver makes any."""
+    start: float = 0.0
+    """m (rad), where a simulated stage stands at first."""
+    substeps: float = 1.0
+    """Multiplies the integration steps of a simulated stage."""
     realtime: bool = False
     """Whether exchanges come by the wall clock."""
     recording: Columns | None = None

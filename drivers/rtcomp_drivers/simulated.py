@@ -47,7 +47,9 @@ class SimulatedDriver(Driver):
         """Put the stage at rest at position 0, friction relaxed, time 0; the same noise each time."""
         if self._simulator is None:
             assert self.bench.stage is not None
-            self._simulator = Simulator(self.bench.stage, seed=self.bench.seed)
+            self._simulator = Simulator(
+                self.bench.stage, seed=self.bench.seed, substeps=self.bench.substeps, start=self.bench.start
+            )
             self._sequence = 0
             self._held = 0.0
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from rtcomp.cli.options import json_option, map_option, output_options, prepare_output
+from rtcomp.cli.options import json_option, map_option, output_options
+from rtcomp.cli.output import prepare_output
 from rtcomp.cli.runs import device_options, finish, load
 
 

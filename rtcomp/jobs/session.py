@@ -20,6 +20,8 @@ from rtcomp.control.limits import limit_state, limit_vector
 from rtcomp.control.pid import pid_state, pid_vector
 from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.conditioning import low_pass
+from rtcomp.hysteresis.interval import IntervalBasis
+from rtcomp.hysteresis.lms import Lms
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
@@ -30,6 +32,7 @@ from rtcomp.loop.realtime import in_force, realtime_process
 from rtcomp.loop.ring import Ring
 from rtcomp.loop.run import Outcome, run, stop_on_signals
 from rtcomp.loop.tick import COLUMNS, Tick, TickSettings
+from rtcomp.recording.reader import Recording
 from rtcomp.recording.recorder import Recorder, RecorderSummary
 
 RING_SECONDS = 8.0
@@ -71,9 +74,22 @@ class Run:
         return np.asarray((self.columns["reference"] - self.columns["position"])[late])
 
 
-def make_device(config: Configuration, recording: Any = None) -> Device:
-    """Build the configured device; it is not opened. Raises ConfigError."""
-    bench = Bench(config.stage, config.period, config.run.seed, config.wall_clock, recording)
+def make_device(
+    config: Configuration, recording: Recording | None = None, start: float = 0.0, substeps: float = 1.0
+) -> Device:
+    """Build the configured device (a `recording` is replayed); it is not opened. Raises ConfigError.
+
+    `start` (m) and `substeps` are for simulated stages.
+    """
+    bench = Bench(
+        stage=config.stage,
+        period=config.period,
+        seed=config.run.seed,
+        realtime=config.wall_clock,
+        recording=recording,
+        start=start,
+        substeps=substeps,
+    )
     settings = {"driver": "replay"} if recording is not None else config.run.device
     given = recording is None and "device" in config.file.data
     return create(settings, bench, config.file if given else None)
@@ -89,8 +105,12 @@ def make_tick(
     """Put the tick together: the configured basis and learner, or a model's basis with its weights."""
     section = config.run.identify
     stage = config.stage
-    basis = model.basis if model is not None else config.basis()
-    learner = config.learner()
+    if model is not None:
+        basis = model.basis
+    else:
+        # Without a section identify nothing learns: a basis of one interval fills the place.
+        basis = config.basis() if section is not None else IntervalBasis([1.0])
+    learner = config.learner() if section is not None else Lms()
     offset = section.offset if section is not None else True
     controller = stage.controller
     if closed_loop and controller is None:

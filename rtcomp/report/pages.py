@@ -96,6 +96,36 @@ def identified_page(done: Identified) -> Page:
     )
 
 
+def simulated_rows(config: Configuration, run: Run) -> list[Row]:
+    """Return the figures of a simulation, for the page and the terminal."""
+    unit = for_axis("m", config.stage.axis)
+    position, voltage = run.columns["position"], run.columns["voltage"]
+    return [
+        Row("Position, lowest", float(position.min()), unit),
+        Row("Position, highest", float(position.max()), unit),
+        Row("Command, largest", float(np.abs(voltage).max()), "V"),
+        *timing_rows(run),
+    ]
+
+
+def simulated_page(config: Configuration, run: Run, *, open_loop: bool) -> Page:
+    """Return the report of `rtcomp simulate`."""
+    c = run.columns
+    unit = for_axis("m", config.stage.axis)
+    reference = None if open_loop else c["reference"]
+    return Page(
+        title="A stage, simulated",
+        subtitle=_subtitle(config),
+        summary=simulated_rows(config, run),
+        sections=[
+            Section("Position", "", position_figure(c["time"], c["position"], reference, unit=unit)),
+            Section("Command", "", force_figure(c["time"], c["voltage"], unit="V", title="Command")),
+        ],
+        configuration=_configuration(config),
+        versions=versions(run),
+    )
+
+
 def compensated_rows(done: Compensated) -> list[Row]:
     """Return the figures of a compensation, for the page and the terminal."""
     unit = for_axis("m", done.config.stage.axis)

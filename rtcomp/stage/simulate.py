@@ -103,12 +103,12 @@ def _integrate(
 
 
 class Simulator:
-    """A stage in motion. Starts at rest at position 0, friction relaxed.
+    """A stage in motion. Starts at rest at `start` (m), friction relaxed.
 
     `substeps` multiplies the number of integration steps (to check that they suffice).
     """
 
-    def __init__(self, stage: Stage, seed: int = 0, substeps: float = 1.0) -> None:
+    def __init__(self, stage: Stage, seed: int = 0, substeps: float = 1.0, start: float = 0.0) -> None:
         self.stage = stage
         moving = [e for e in stage.chain if e.place is not Place.SENSOR]
         self._moving, self._moving_start = Program(moving), Program(moving)
@@ -116,7 +116,7 @@ class Simulator:
         self._sensing, self._sensing_start = Program(sensing), Program(sensing)
         self._base = np.array([stage.mass, stage.force_constant])
         self.step = largest_step(stage) / substeps
-        self._seed = seed
+        self._seed, self._start = seed, start
         self.reset()
 
     def reset(self) -> None:
@@ -125,6 +125,7 @@ class Simulator:
         self._sensing.s[:] = self._sensing_start.s
         self._w: Floats = np.zeros(wires.COUNT)
         self._w[MASS] = self.stage.mass
+        self._w[POSITION] = self._start
         self._w[REACH] = self._w[SCALE] = 1.0
         self._random = np.random.default_rng(self._seed)
         self._noise = self._random.standard_normal(4096)
