@@ -21,7 +21,10 @@ def read_mat5(path: Path) -> Table:
     """Read a MATLAB 5 file; raise RecordingError where it is truncated or damaged."""
     from scipy.io import loadmat
 
+    from rtcomp.recording import mat5
+
     try:
+        mat5.check(path.read_bytes())
         content = loadmat(path, simplify_cells=True)
     except Exception as error:  # the library meets a cut-off file with a dozen kinds of error
         raise RecordingError(f"{path}: is truncated or damaged: {_line(error)}") from None

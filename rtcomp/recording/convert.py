@@ -44,7 +44,7 @@ def convert(
     write(recording, target, force)
     if recording.weights is not None and write not in (_hdf5, _mat):
         recording.notes.append(
-            f"the identifier's weights have no place in {target.suffix}: not in {target.name}"
+            f"the identifier's weights are not in {target.name}: only HDF5 and MAT hold them"
         )
     if recording.metadata and write is _csv:
         recording.notes.append(f"metadata is not in {target.name}: CSV has no place for it")
