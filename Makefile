@@ -28,8 +28,8 @@ check: $(DEV) ## style, types, layers and every quick test
 bench: $(DEV) ## the benchmarks, one after the other
 	@set -e; for file in tools/bench_*.py; do echo "== $$file"; $(BIN)/python "$$file" $(ARGS); done
 
-picture: $(DEV) ## draw the README's picture anew
-	$(BIN)/python tools/picture.py $(ARGS)
+picture: $(DEV) ## draw the pictures of README and pages anew
+	$(BIN)/python tools/make_pictures.py $(ARGS)
 
 clean: ## remove out/demo and what tools and compilers cached; .venv stays
 	rm -rf out/demo build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .benchmarks
