@@ -91,9 +91,24 @@ def compensate(
     )
 
 
-def live(config: Configuration, switch_at: float, fade: float, *, path: Path | None = None) -> Run:
+def live(
+    config: Configuration,
+    switch_at: float,
+    fade: float,
+    *,
+    path: Path | None = None,
+    watch: Watch | None = None,
+) -> Run:
     """Identify and compensate in one run: learn from the start, feed forward from `switch_at` (s) on."""
-    return follow(config, "", learn=ALWAYS, feedforward_from=switch_at, feedforward_fade=fade, path=path)
+    return follow(
+        config,
+        "",
+        learn=ALWAYS,
+        feedforward_from=switch_at,
+        feedforward_fade=fade,
+        path=path,
+        watch=watch,
+    )
 
 
 def _in(out: Path | None, name: str) -> Path | None:

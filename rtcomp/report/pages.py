@@ -12,6 +12,7 @@ from rtcomp import __version__
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.jobs.compensate import Compensated
 from rtcomp.jobs.configuration import Configuration
+from rtcomp.jobs.demo import FADE, SWITCH_AT, Demonstrated
 from rtcomp.jobs.identify import Identified, friction_level
 from rtcomp.jobs.judge import Judgement
 from rtcomp.jobs.session import Run
@@ -158,6 +159,60 @@ def compensated_page(done: Compensated) -> Page:
         configuration=_configuration(done.config),
         versions=versions(done.with_it),
         tone="good" if better > 2 else "poor",
+    )
+
+
+def demo_rows(done: Demonstrated) -> list[Row]:
+    """Return the figures of the demonstration, for the page and the terminal."""
+    unit = for_axis("m", done.identified.config.stage.axis)
+    before, after = live_tracking(done)
+    return [
+        Row("Live run, before feedforward, rms", before, unit, f"until {SWITCH_AT:g} s"),
+        Row("Live run, with feedforward, rms", after, unit, "the last three seconds"),
+        *[row for row in identified_rows(done.identified) if row.name.startswith(("Held", "Friction"))],
+        *compensated_rows(done.compensated),
+    ]
+
+
+def live_tracking(done: Demonstrated) -> tuple[float, float]:
+    """Return the rms tracking error (m) of the live run before feedforward and at its end."""
+    time, error = done.live.columns["time"], done.live.tracking_error()
+    before = error[(time > SWITCH_AT - 3.0) & (time < SWITCH_AT)]
+    after = error[time > max(time[-1] - 3.0, SWITCH_AT + FADE)]
+    return float(np.sqrt(np.mean(before**2))), float(np.sqrt(np.mean(after**2)))
+
+
+def demo_page(done: Demonstrated) -> Page:
+    """Return the report of `rtcomp demo`."""
+    i, k = done.identified, done.compensated
+    judged = i.held_out or i.in_sample
+    unit = for_axis("m", i.config.stage.axis)
+    c = done.live.columns
+    switched = c["time"] >= SWITCH_AT
+    error = done.live.tracking_error()
+    watched = tracking_figure(
+        (c["time"][~switched], error[~switched]), (c["time"][switched], error[switched]), unit=unit
+    )
+    says = f"One run: the model learns from the start; from {SWITCH_AT:g} s on it is fed forward."
+    return Page(
+        title="Friction hysteresis, identified and compensated",
+        subtitle=_subtitle(i.config),
+        verdict=[
+            f"With its weights frozen, the model is off by {100 * judged.relative:.2g} % of the peak force "
+            "on motion that it was not learned from.",
+            f"Fed forward, it makes the tracking error {k.improvement:.0f} times smaller, same controller.",
+        ],
+        summary=demo_rows(done),
+        sections=[
+            Section("Identified while running, then fed forward", says, watched),
+            *_model_sections(i, judged),
+            tracking_section(k),
+            *_motion_sections(k.with_it, i.config),
+            *_timing(k.with_it),
+        ],
+        configuration=_configuration(i.config),
+        versions=versions(k.with_it),
+        tone="good" if k.improvement > 2 else "poor",
     )
 
 

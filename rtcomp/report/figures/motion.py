@@ -23,9 +23,11 @@ def _against_time(
         return figure
     kept = peak_indices([y for _, y, *_ in curves], points)
     for name, y, colour, width, dash in curves:
+        # What lies below is broad and pale, so that the line on it stays visible where they agree.
         c.line(
-            figure, t[kept] * in_time.factor, y[kept] * drawn_in.factor, name, colour, width=width, dash=dash
-        )
+            figure, t[kept] * in_time.factor, y[kept] * drawn_in.factor, name, colour, width=width, dash=dash,
+            opacity=1.0 if len(curves) == 1 or width < 2.0 else 0.5,
+        )  # fmt: skip
     c.note_thinned(figure, len(kept), len(t))
     return figure
 
@@ -45,7 +47,7 @@ def position_figure(
     """
     curves = [("measured", c.floats(position), palette.MEASURED, 1.6, "solid")]
     if reference is not None:
-        curves.insert(0, ("reference", c.floats(reference), palette.REFERENCE, 4.0, "solid"))
+        curves.insert(0, ("reference", c.floats(reference), palette.REFERENCE, 4.5, "solid"))
     return _against_time(time, curves, "Position", unit, points)
 
 
@@ -62,7 +64,7 @@ def force_figure(
 
     `time` in s; forces of the same length in `unit` (``"N"``, ``"N m"``, or ``"V"`` with another `title`).
     """
-    curves = [("measured", c.floats(measured), palette.MEASURED, 4.0, "solid")]
+    curves = [("measured", c.floats(measured), palette.MEASURED, 1.6 if model is None else 4.5, "solid")]
     if model is not None:
         curves.append(("model", c.floats(model), palette.MODEL, 1.4, "solid"))
     return _against_time(time, curves, title, unit, points)
