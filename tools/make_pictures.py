@@ -1,11 +1,12 @@
 """Make the pictures of the README from finished runs: docs/figures/NAME.svg and NAME-dark.svg.
 
-    tools/make_pictures.py --loop A/recording.h5 --model A/model.yaml \\
-        --without B/recording.h5 --with C/recording.h5
+    rtcomp identify configs/leuven.yaml --out out/leuven
+    rtcomp compensate configs/leuven.yaml --model out/leuven/model.yaml --out out/tracking
+    tools/make_pictures.py out/leuven out/tracking
 
-`--loop` is motion that the model has not learned from (a part of it with `--loop-window`); `--without` and
-`--with` are the same reference under the same controller without and with compensation. Needs matplotlib
-(extra `dev`): plotly's own static pictures need a browser.
+The first folder gives the loop: the motion that the model was judged on, beside the model with frozen
+weights. The second gives the tracking error without and with compensation. Figures are counted as the runs'
+own reports count them. Needs matplotlib (extra `dev`): plotly's own static pictures need a browser.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from rtcomp.report import palette
 from rtcomp.report.decimate import path_indices, peak_indices
 from rtcomp.report.figures import first_reversal, rms_and_peak
 from rtcomp.report.quantities import Scale, scale, typeset, written
+from rtcomp.stage.balance import bandwidth
 from rtcomp.stage.stage import Stage
 from rtcomp.units import for_axis
 
@@ -55,13 +57,14 @@ STYLE = {
 class Loop:
     """Force (N) against position (m), measured and modelled, equal lengths.
 
-    The first `virgin_rows` are the first loading from the virgin state.
+    The first `virgin_rows` are the first loading from the virgin state; the error counts from row `counted`.
     """
 
     position: Floats
     measured: Floats
     model: Floats
     virgin_rows: int = 0
+    counted: int = 0
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,7 @@ def static_picture(
             "grid.color": colour(palette.GRID),
         }
     ):
-        figure = plt.figure(figsize=(11.5, 4.3), layout="constrained")
+        figure = plt.figure(figsize=(11.5, 4.4), layout="constrained")
         figure.get_layout_engine().set(w_pad=0.12, h_pad=0.06)
         left, right = figure.subfigures(1, 2, width_ratios=[1.0, 1.25])
         for part in (left, right):
@@ -138,7 +141,8 @@ def _draw_loop(axes: Any, loop: Loop, colour: Any, unit: str, force_unit: str) -
             first = path_indices([c[: loop.virgin_rows] for c in columns], 600)
             thin = {**look, "label": None, "lw": 0.55 * float(look["lw"])}
             axes.plot(x[first], y[first], color=colour(of), ls=(0, (2, 1.2)), **thin)
-    error = rms_and_peak(loop.model - loop.measured).rms / rms_and_peak(loop.measured).peak * 100.0
+    model, measured = loop.model[loop.counted :], loop.measured[loop.counted :]
+    error = rms_and_peak(model - measured).rms / rms_and_peak(measured).peak * 100.0
     _title(axes, f"Motion it never saw: force to {written(error, '%', 2)} of its peak")
     _room_above(axes, 0.2)
     axes.set_xlabel(_label("Position", along))
@@ -179,50 +183,47 @@ def read(path: Path) -> tuple[dict[str, Floats], dict[str, Any]]:
         return columns, dict(file.attrs)
 
 
-def loop_of(recording: Path, model: Path, window: tuple[float, float] | None) -> tuple[Loop, str]:
-    """Return measured friction and the frozen model's along a recording, and the kind of axis."""
-    columns, about = read(recording)
+def loop_of(folder: Path) -> tuple[Loop, str]:
+    """Return measured and modelled friction in a folder of `rtcomp identify`, and the kind of axis."""
+    judged = folder / "judge.h5"
+    columns, about = read(judged if judged.exists() else folder / "recording.h5")
     stage = Stage.from_dict(json.loads(about["stage"]))
-    settings = json.loads(about.get("configuration", "{}")).get("identify") or {}
+    configured = json.loads(about["configuration"])
+    smoothing = float((configured.get("identify") or {}).get("smoothing", 0.0))
     friction = friction_of(
-        stage, columns["time"], columns["position"], columns["voltage"],
-        int(about.get("delay_ticks", 0)), float(settings.get("smoothing", 0.0)),
+        stage, columns["time"], columns["position"], columns["voltage"], int(about["delay_ticks"]),
+        # As the job judges: on unsmoothed motion, but where noise asked for a low cut-off.
+        smoothing if 0.0 < smoothing < bandwidth(stage.rate) else 0.0,
     )  # fmt: skip
-    force = HysteresisModel.load(model).response(friction.position)
-    first, last = window or (-np.inf, np.inf)
-    shown = (friction.time >= first) & (friction.time <= last)
-    # Without a window the run starts at rest, in the virgin state, and loads up to its first reversal.
-    virgin = 0 if window else first_reversal(friction.position)
-    return Loop(friction.position[shown], friction.force[shown], force[shown], virgin), stage.axis
+    force = HysteresisModel.load(folder / "model.yaml").response(friction.position)
+    settle = float((configured.get("judge") or {}).get("settle", 0.0))
+    counted = int(np.searchsorted(friction.time, friction.time[0] + settle))
+    virgin = first_reversal(friction.position)
+    return Loop(friction.position, friction.force, force, virgin, counted), stage.axis
 
 
-def error_of(recording: Path, window: tuple[float, float] | None) -> tuple[Floats, Floats]:
-    """Return time (s) and reference less position (m) of a recording."""
-    columns, _ = read(recording)
-    first, last = window or (-np.inf, np.inf)
-    shown = (columns["time"] >= first) & (columns["time"] <= last)
-    return columns["time"][shown], (columns["reference"] - columns["position"])[shown]
+def tracking_of(folder: Path) -> Tracking:
+    """Return the errors in a folder of `rtcomp compensate`, without what its comparison leaves out."""
+    runs = []
+    for name in ("without.h5", "with.h5"):
+        columns, about = read(folder / name)
+        settle = float((json.loads(about["configuration"]).get("compensate") or {}).get("settle", 1.0))
+        shown = columns["time"] >= settle
+        runs += [columns["time"][shown], (columns["reference"] - columns["position"])[shown]]
+    return Tracking(*runs)
 
 
 def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--loop", type=Path, required=True)
-    parser.add_argument("--model", type=Path, required=True)
-    parser.add_argument("--without", type=Path, required=True)
-    parser.add_argument("--with", type=Path, required=True, dest="compensated")
-    parser.add_argument("--loop-window", type=float, nargs=2, metavar=("FROM", "TO"), help="s")
-    parser.add_argument(
-        "--window", type=float, nargs=2, metavar=("FROM", "TO"), help="s, of the tracking error"
-    )
-    parser.add_argument(
-        "--out", type=Path, default=Path(__file__).resolve().parent.parent / "docs" / "figures"
-    )
+    parser.add_argument("identified", type=Path, help="folder of rtcomp identify")
+    parser.add_argument("compensated", type=Path, help="folder of rtcomp compensate")
+    parser.add_argument("--out", type=Path, default=TOP / "docs" / "figures")
     parser.add_argument("--name", default="compensation")
     given = parser.parse_args(arguments)
-    loop, axis = loop_of(given.loop, given.model, given.loop_window)
-    tracking = Tracking(*error_of(given.without, given.window), *error_of(given.compensated, given.window))
+    loop, axis = loop_of(given.identified)
+    tracking = tracking_of(given.compensated)
     for suffix, dark in (("", False), ("-dark", True)):
         path = given.out / f"{given.name}{suffix}.svg"
         static_picture(

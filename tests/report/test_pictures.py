@@ -43,47 +43,41 @@ def pictures() -> ModuleType:
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A slow motion of a stage with one yielding spring, its true model, and two tracking runs."""
+    """What identify and compensate leave: slow motion of a stage with one yielding spring, its true model,
+    and two tracking runs."""
     folder = tmp_path_factory.mktemp("run")
     time = np.arange(4000) * 1e-3
     position = 2e-5 * np.sin(2.0 * time) * np.exp(-time / 3.0)
     model = HysteresisModel(IntervalBasis(np.array([8e-6])), np.array([2e5]))
     model.save(folder / "model.yaml")
-    stage = json.dumps(Stage.from_dict(STAGE).to_dict())
-    for name, error in (("loop", 0.0), ("without", 1e-6), ("with", 1e-8)):
+    configuration = {"identify": {"smoothing": 0.0}, "judge": {"settle": 0.5}, "compensate": {"settle": 1.0}}
+    for name, error in (("judge", 0.0), ("without", 1e-6), ("with", 1e-8)):
         with h5py.File(folder / f"{name}.h5", "w") as file:
             file["time"], file["position"] = time, position
             file["reference"] = position + error * np.sign(np.sin(2 * time) + 1e-9)
             file["voltage"] = model.response(position) / 4.0
-            file.attrs["stage"] = stage
+            file.attrs["stage"] = json.dumps(Stage.from_dict(STAGE).to_dict())
+            file.attrs["configuration"] = json.dumps(configuration)
+            file.attrs["delay_ticks"] = 0
             file.create_group("weights")
     return folder
 
 
 def test_the_loop_is_measured_friction_beside_the_frozen_model(pictures: ModuleType, run: Path) -> None:
-    loop, axis = pictures.loop_of(run / "loop.h5", run / "model.yaml", None)
+    loop, axis = pictures.loop_of(run)
     assert axis == "linear"
     assert np.abs(loop.measured).max() == pytest.approx(0.8, rel=0.02)
     assert np.sqrt(np.mean((loop.measured - loop.model) ** 2)) < 0.02
     # Loads until sin(2 t) exp(-t / 3) turns back: tan(2 t) = 6.
     assert loop.virgin_rows == pytest.approx(1000 * np.arctan(6.0) / 2, abs=2)
+    assert loop.counted == 500
 
 
 def test_pictures_are_made_in_light_and_dark_and_always_the_same(
     pictures: ModuleType, run: Path, tmp_path: Path
 ) -> None:
-    arguments = [
-        "--loop",
-        str(run / "loop.h5"),
-        "--model",
-        str(run / "model.yaml"),
-        "--without",
-        str(run / "without.h5"),
-        "--with",
-        str(run / "with.h5"),
-    ]
     for out in ("a", "b"):
-        pictures.main([*arguments, "--out", str(tmp_path / out)])
+        pictures.main([str(run), str(run), "--out", str(tmp_path / out)])
     names = sorted(p.name for p in (tmp_path / "a").iterdir())
     assert names == ["compensation-dark.svg", "compensation.svg"]
     texts = [(tmp_path / "a" / name).read_text() for name in names]
@@ -94,7 +88,10 @@ def test_pictures_are_made_in_light_and_dark_and_always_the_same(
     assert texts[0] != texts[1]
 
 
-def test_the_window_cuts_time(pictures: ModuleType, run: Path) -> None:
-    time, error = pictures.error_of(run / "without.h5", (1.0, 2.0))
-    assert time[0] == 1.0 and time[-1] == 2.0
-    assert np.abs(error) == pytest.approx(np.full(1001, 1e-6))
+def test_the_tracking_error_leaves_out_what_the_comparison_leaves_out(
+    pictures: ModuleType, run: Path
+) -> None:
+    tracking = pictures.tracking_of(run)
+    assert tracking.time_without[0] == tracking.time_with[0] == 1.0
+    assert np.abs(tracking.without) == pytest.approx(np.full(3000, 1e-6))
+    assert np.abs(tracking.compensated) == pytest.approx(np.full(3000, 1e-8))
