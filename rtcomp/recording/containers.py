@@ -7,6 +7,7 @@ Whatever the nesting, every numeric vector becomes a column by its own name, or 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from rtcomp.errors import RecordingError
+from rtcomp.recording.superblock import END_OF_FILE, FLAGS, SIGNATURE, SIZE, VERSION
 from rtcomp.recording.table import Floats, Table
 
 
@@ -39,16 +41,8 @@ def read_hdf5(path: Path) -> Table:
     import h5py
 
     try:
-        try:
-            file = h5py.File(path, "r")
-        except OSError as error:
-            if "already open for write" not in str(error):
-                raise
-            file = h5py.File(path, "r", swmr=True)
-        if _ours(file) and not int(file.attrs.get("complete", 0)):
-            file.close()
-            file = h5py.File(path, "r", swmr=True)  # somebody may be writing it
-        with file:
+        # The way that also reads a file while it is being written; only its newer form can be read so.
+        with h5py.File(path, "r", swmr=_superblock_is_new(path)) as file:
             if _ours(file):
                 return _own(file)
             table = _table(_tree(file))
@@ -56,6 +50,23 @@ def read_hdf5(path: Path) -> Table:
             return table
     except (OSError, RuntimeError, KeyError) as error:
         raise RecordingError(f"{path}: is truncated or damaged: {_line(error)}") from None
+
+
+def _superblock_is_new(path: Path) -> bool:
+    """Return whether the superblock has version 3; raise OSError where the file is shorter than it says.
+
+    The library checks the length itself, but not in a file that is opened as one that may be growing. One
+    that carries the flags of being written may be shorter until its next flush.
+    """
+    with path.open("rb") as file:
+        block = file.read(SIZE)
+        if block[:8] != SIGNATURE or len(block) < SIZE or block[VERSION] != 3:
+            return False
+        end = int.from_bytes(block[END_OF_FILE : END_OF_FILE + 8], "little")
+        size = file.seek(0, os.SEEK_END)
+        if size < end and not block[FLAGS]:
+            raise OSError(f"{end - size} bytes are missing")
+    return True
 
 
 def _ours(file: Any) -> bool:

@@ -8,7 +8,6 @@ it grows. The format is bounded to HDF5 1.10, the first with SWMR, so that older
 from __future__ import annotations
 
 import contextlib
-import errno
 import fcntl
 import json
 import os
@@ -22,6 +21,7 @@ import numpy.typing as npt
 from h5py import h5a, h5f, h5p
 
 from rtcomp.recording.superblock import clear_flags
+from rtcomp.recording.writer import take_name
 from rtcomp.units import COLUMN_UNITS, for_axis
 
 Floats = npt.NDArray[np.float64]
@@ -43,13 +43,16 @@ class RecordingFile:
         metadata: Mapping[str, Any],
         weights: int = 0,
         axis: str = "linear",
+        overwrite: bool = False,
     ) -> None:
-        """Create the file; raise FileExistsError where there is one, OSError where the disk refuses."""
-        if os.path.lexists(path):
-            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+        """Create the file; raise OutputExistsError where there is one, OSError where the disk refuses.
+
+        With `overwrite`, one that is there is replaced once the new one stands.
+        """
         self._descriptor = -1
+        temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
         try:
-            self._file = _create(path)
+            self._file = _create(temporary)
             self._columns = [self._dataset(self._file, c, COLUMN_UNITS.get(c, "1"), axis) for c in columns]
             self._weights_time = self._weights = None
             self._next_weights = -np.inf
@@ -66,15 +69,20 @@ class RecordingFile:
             self._file.attrs["rows_lost"] = np.int64(0)
             self._file.attrs.create("ended", b"no", dtype=f"S{_ENDED_BYTES}")
             self._file.swmr_mode = True  # from here on: no new names, only more rows
-            self._descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC)
+            self._descriptor = os.open(temporary, os.O_RDWR | os.O_CLOEXEC)
             fcntl.flock(self._descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
             self._reserve = 8 * (3 * CHUNK_ROWS * len(columns) + 3 * _WEIGHTS_CHUNK * weights) + 65536
             self._end = clear_flags(self._descriptor)
             self.reserve()
+            if overwrite:
+                temporary.replace(path)
+            else:
+                take_name(temporary, path)
         except BaseException:
             self.abandon()
-            path.unlink(missing_ok=True)
             raise
+        finally:
+            temporary.unlink(missing_ok=True)
         self.rows = 0
         self._unflushed = 0
 

@@ -77,13 +77,12 @@ class Recorder:
         """
         target = Path(path).absolute()
         _check(ring, columns, metadata, weights_columns, flush_s)
-        if os.path.lexists(target):
-            if not overwrite:
-                raise OutputExistsError(f"{path}: exists already; choose another name or use --force")
-            _remove(target)
+        if target.is_dir() or (os.path.lexists(target) and not overwrite):
+            raise OutputExistsError(f"{path}: exists already; choose another name or use --force")
         job = {
             "path": str(target), "ring": ring.descriptor, "parent": os.getpid(), "columns": list(columns),
             "weights_columns": weights_columns, "metadata": dict(metadata), "flush_s": flush_s, "axis": axis,
+            "overwrite": overwrite,
         }  # fmt: skip
         line = (json.dumps(job, default=_plain) + "\n").encode()
         process = subprocess.Popen(
@@ -208,13 +207,6 @@ def _check(
         raise ValueError(f"flush_s is {flush_s:g} s; allowed is (0, {LONGEST_FLUSH_S:g}]")
     if taken := [key for key in metadata if key in _RESERVED]:
         raise ValueError(f"metadata {taken[0]!r} is a name that the recorder writes itself")
-
-
-def _remove(target: Path) -> None:
-    try:
-        target.unlink()
-    except OSError as error:
-        raise OutputExistsError(f"{target}: exists and cannot be replaced: {error.strerror}") from None
 
 
 def _plain(value: Any) -> Any:

@@ -66,6 +66,7 @@ def _prepare() -> list[int]:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
     asked: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _frame: asked.append(number))
     if hasattr(os, "sched_setscheduler"):
@@ -126,7 +127,12 @@ def main() -> int:
     try:
         ring = Ring.attach(job["ring"])
         file = RecordingFile(
-            Path(job["path"]), job["columns"], job["metadata"], job["weights_columns"], job["axis"]
+            Path(job["path"]),
+            job["columns"],
+            job["metadata"],
+            job["weights_columns"],
+            job["axis"],
+            job["overwrite"],
         )
     except (OSError, RuntimeError) as error:  # the library raises either
         _give_up(error)

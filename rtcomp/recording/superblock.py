@@ -17,8 +17,8 @@ from __future__ import annotations
 import os
 
 SIZE = 48
-_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_VERSION, _FLAGS, _END_OF_FILE, _CHECKSUM = 8, 11, 28, 44
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+VERSION, FLAGS, END_OF_FILE, _CHECKSUM = 8, 11, 28, 44
 _WORD = 0xFFFFFFFF
 
 
@@ -63,13 +63,13 @@ def clear_flags(descriptor: int) -> int:
     refuses, ValueError where the file is not HDF5 with superblock version 3.
     """
     block = bytearray(os.pread(descriptor, SIZE, 0))
-    if len(block) < SIZE or block[:8] != _SIGNATURE or block[_VERSION] != 3:
+    if len(block) < SIZE or block[:8] != SIGNATURE or block[VERSION] != 3:
         raise ValueError("not an HDF5 file with superblock version 3")
-    end = int.from_bytes(block[_END_OF_FILE : _END_OF_FILE + 8], "little")
-    if block[_FLAGS]:
+    end = int.from_bytes(block[END_OF_FILE : END_OF_FILE + 8], "little")
+    if block[FLAGS]:
         if os.fstat(descriptor).st_size < end:
             os.ftruncate(descriptor, end)
-        block[_FLAGS] = 0
+        block[FLAGS] = 0
         block[_CHECKSUM:] = lookup3(bytes(block[:_CHECKSUM])).to_bytes(4, "little")
         os.pwrite(descriptor, bytes(block), 0)
     return end

@@ -37,7 +37,7 @@ def replacing(target: str | os.PathLike[str], force: bool = False) -> Iterator[P
         if force:
             temporary.replace(target)
         else:
-            _take_name(temporary, target)
+            take_name(temporary, target)
     except OSError as error:
         if isinstance(error, OutputExistsError):
             raise
@@ -46,7 +46,7 @@ def replacing(target: str | os.PathLike[str], force: bool = False) -> Iterator[P
         temporary.unlink(missing_ok=True)
 
 
-def _take_name(temporary: Path, target: Path) -> None:
+def take_name(temporary: Path, target: Path) -> None:
     """Rename without ever replacing: a hard link fails where the name is taken, in one step."""
     try:
         target.hardlink_to(temporary)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import select
 import signal
 import subprocess
 import sys
@@ -49,8 +50,6 @@ class Victim:
         return written
 
     def wait_for_recorder(self) -> None:
-        import select
-
         assert select.select([self.recorder_watch], [], [], 10)[0], "the recorder did not end"
 
     def close(self) -> None:

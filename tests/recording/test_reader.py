@@ -443,6 +443,17 @@ def test_truncated_copy_of_emps(tmp_path: Path) -> None:
     assert "truncated" in said and "bytes are missing" in said
 
 
+def test_hdf5_that_another_program_is_writing(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w", libver="latest") as file:
+        for name, column in motion().items():
+            file.create_dataset(name, data=column, maxshape=(None,), chunks=(256,))
+        file.swmr_mode = True
+        file.flush()
+        shutil.copy(path, tmp_path / "killed.h5")
+    assert len(read(path)) == len(read(tmp_path / "killed.h5")) == 500
+
+
 def test_hdf5_of_others_with_attributes(tmp_path: Path) -> None:
     path = write_hdf5(tmp_path / "a.h5", motion(), rig="left", setup={"a": [1, 2]})
     with h5py.File(path, "a") as file:

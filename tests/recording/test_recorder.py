@@ -198,16 +198,22 @@ def test_full_disk_ends_the_recording_in_order(tmp_path: Path, ring: Ring) -> No
     assert np.array_equal(recording.voltage, -np.arange(summary.rows))
 
 
-def test_a_disk_full_from_the_start_is_said_at_once(tmp_path: Path, ring: Ring) -> None:
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_a_disk_full_from_the_start_is_said_at_once(tmp_path: Path, ring: Ring, overwrite: bool) -> None:
+    if overwrite:
+        (tmp_path / "run.h5").write_text("the last run")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))
     try:
         with pytest.raises(RecordingError, match="cannot be made: File too large") as caught:
-            Recorder.start(tmp_path / "run.h5", ring, COLUMNS, {}, weights_columns=WEIGHTS)
+            Recorder.start(
+                tmp_path / "run.h5", ring, COLUMNS, {}, weights_columns=WEIGHTS, overwrite=overwrite
+            )
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert "\n" not in str(caught.value)
-    assert list(tmp_path.iterdir()) == []
+    left = [item.read_text() for item in tmp_path.iterdir()]
+    assert left == (["the last run"] if overwrite else [])
 
 
 @pytest.mark.parametrize("where", ["missing/run.h5", "file/run.h5"])
