@@ -120,7 +120,8 @@ def leuven(p: Floats, s: Floats, w: Floats) -> None:
 class Leuven(ListEffect):
     """The integrated friction structure of Leuven; `elements` lists {stiffness, reach}: the virgin curve.
 
-    Past the last reach the curve goes on at its last slope: yielding is made by the level s(v).
+    Past the largest reach the curve goes on at its last slope, so that this reach itself is without effect:
+    yielding is made by the level s(v).
     """
 
     name = "leuven"

@@ -1,0 +1,398 @@
+"""What every entry of the catalogue promises, tested on each by itself, third parties' included.
+
+An entry needs nothing here: its `example` shows it within the motion below, the rest is read from its class.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+import re
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.optimize import least_squares
+
+from rtcomp import physics
+from rtcomp.errors import ConfigError
+from rtcomp.physics import Place
+from rtcomp.physics.drive import DriveForce
+from rtcomp.physics.maxwell_slip import MaxwellSlip
+from rtcomp.physics.rows import motion_rows, over_rows
+from rtcomp.physics.wires import (
+    DRIVE,
+    FRICTION,
+    GAIN,
+    MASS,
+    MOVED,
+    NOISE,
+    POSITION,
+    PUSH,
+    REACH,
+    SCALE,
+    SENSED,
+    STEP,
+    VELOCITY,
+    VOLTS,
+)  # fmt: skip
+
+ENTRIES = list(physics.entries())
+every = pytest.mark.parametrize("entry", ENTRIES, ids=[e.name for e in ENTRIES])
+SIGNALS = [VOLTS, DRIVE, PUSH, FRICTION, MASS, GAIN, SENSED]
+
+# FORMATS.md, "The effects, by name": parameters and units, those that may be left out in brackets.
+VOCABULARY = {
+    "drive": {
+        "drive-offset": "offset (V)",
+        "drive-gain": "gain (1)",
+        "drive-deadband": "width (V)",
+        "drive-saturation": "limit (V)",
+        "drive-delay": "delay (s)",
+        "drive-lag": "time_constant (s)",
+        "back-emf": "coefficient (N s/m)",
+        "torque-ripple": "amplitude (1), period (m), phase (rad)",
+        "cogging": "amplitude (N), period (m), phase (rad)",
+    },
+    "mechanics": {
+        "inertia": "mass (kg)",
+        "parallel-spring": "stiffness (N/m), cubic (N/m^3)",
+        "gravity": "force (N), amplitude (N m), phase (rad)",
+        "end-stop": "position (m), stiffness (N/m)",
+        "backlash": "gap (m)",
+        "resonance": "frequency (Hz), damping (1), mass_ratio (1)",
+    },
+    "friction": {
+        "viscous-friction": "coefficient (N s/m)",
+        "quadratic-drag": "coefficient (N s^2/m^2)",
+        "asymmetric-friction": "asymmetry (1)",
+        "asymmetric-viscous-friction": "ratio (1)",
+        "stribeck": "rise (1), velocity (m/s)",
+        "position-dependent-friction": "amplitude (1), period (m), phase (rad), slope (1/m)",
+        "load-dependent-friction": "coefficient (1)",
+        "non-congruent-friction": "softening (1)",
+        "frictional-lag": "time_constant (s)",
+        "stiction-ageing": "growth (1), distance (m)",
+        "friction-drift": "change (1), time_constant (s)",
+        "creep": "fraction (1), time_constant (s)",
+    },
+    "sensor": {
+        "sensor-scale": "scale (1)",
+        "sensor-delay": "delay (s)",
+        "sensor-periodic-error": "amplitude (m), period (m)",
+        "sensor-drift": "drift (m), time_constant (s)",
+        "sensor-jump": "size (m), time (s)",
+    },
+    "disturbance": {
+        "tonal-disturbance": "amplitude (N), frequency (Hz)",
+        "constant-force": "force (N)",
+    },
+}
+
+
+def motion(seed: int = 0) -> np.ndarray:
+    """Rows of 4 s at 1 kHz: micrometres with nested reversals, then +-1 mm at up to 50 mm/s, at up to 8 V."""
+    random = np.random.default_rng(seed)
+    t = np.arange(1, 4001) * 1e-3
+    small = 20e-6 * np.sin(2 * np.pi * 0.5 * t) * np.sin(2 * np.pi * 3 * t)
+    chirp = 2 * np.pi * (0.5 * (t - 2) + 1.9 * (t - 2) ** 2)
+    large = np.where(t > 2, 1e-3 * np.sin(chirp), 0.0)
+    volts = 5 * np.sin(2 * np.pi * 1.7 * t + seed) + 3 * np.sin(2 * np.pi * 13 * t)
+    rows = motion_rows(small + large, 1e-3, volts)
+    rows[:, MASS], rows[:, GAIN], rows[:, NOISE] = 2.0, 4.0, random.standard_normal(len(t))
+    return rows
+
+
+MOTION = motion()
+
+
+def chain_of(*effects):
+    """The effects in a plain stage with friction."""
+    stage = [DriveForce(), MaxwellSlip([(8e5, 2e-6), (4e5, 7e-6)])]
+    return sorted([*effects, *stage], key=lambda e: (e.place, e.order))
+
+
+def signals(*effects, rows=MOTION):
+    return over_rows(chain_of(*effects), rows.copy())[:, SIGNALS]
+
+
+def example(entry, **changes):
+    return entry.from_dict({**entry.example, **changes})
+
+
+def leaves(tree, path=()):
+    """Paths of all numbers in an entry's dictionary."""
+    if isinstance(tree, dict):
+        return [leaf for key, value in tree.items() for leaf in leaves(value, (*path, key))]
+    if isinstance(tree, list):
+        return [leaf for i, value in enumerate(tree) for leaf in leaves(value, (*path, i))]
+    return [path] if isinstance(tree, int | float) else []
+
+
+def pick(tree, path):
+    for key in path:
+        tree = tree[key]
+    return tree
+
+
+def put(tree, path, value):
+    tree = copy.deepcopy(tree)
+    pick(tree, path[:-1])[path[-1]] = value
+    return tree
+
+
+@every
+def test_text_is_complete(entry):
+    for field in ("says", "equation", "source", "signature", "experiment"):
+        text = getattr(entry, field)
+        assert text == text.strip() and text, field
+        assert not text.endswith("."), f"{field} stands inside sentences"
+        assert "TODO" not in text
+    for field in ("says", "signature", "experiment"):
+        assert len(getattr(entry, field).split()) >= 3, field
+    assert "=" in entry.equation or "<-" in entry.equation
+    assert entry.__doc__ and entry.__doc__.strip().endswith(".")
+    for parameter in (*entry.parameters, *entry.element):
+        assert re.fullmatch(r"[a-z]+(_[a-z]+)*", parameter.name)
+        assert parameter.unit and parameter.says.strip()
+        assert math.isfinite(parameter.low) and math.isfinite(parameter.high)
+        assert parameter.low < parameter.high
+        if parameter.default is not None:
+            assert parameter.check(parameter.default, entry.name) == parameter.default
+
+
+@every
+def test_name_and_parameters_are_those_of_the_vocabulary(entry):
+    assert re.fullmatch(r"[a-z]+(-[a-z]+)*", entry.name)
+    assert physics.entry(entry.name) is entry
+    assert isinstance(entry.place, Place)
+    for place, effects in VOCABULARY.items():
+        if entry.name in effects:
+            assert entry.place.name.lower() == place
+            assert ", ".join(f"{p.name} ({p.unit})" for p in entry.parameters) == effects[entry.name]
+
+
+def test_names_are_unique_and_a_wrong_one_finds_the_nearest():
+    assert len({e.name for e in ENTRIES}) == len(ENTRIES)
+    with pytest.raises(ConfigError, match="no effect is named 'coging'; did you mean 'cogging'"):
+        physics.build({"name": "coging"})
+    with pytest.raises(ConfigError, match="needs a name"):
+        physics.build({"amplitude": 1.0})
+    with pytest.raises(ValueError, match="already has"):
+        physics.register(ENTRIES[0])
+
+
+@every
+def test_it_changes_the_output(entry):
+    with_it, without = signals(example(entry)), signals()
+    assert np.all(np.isfinite(with_it))
+    change = np.max(np.abs(with_it - without), axis=0)
+    assert np.any(change > 1e-3 * np.max(np.abs(without), axis=0)), change
+
+
+@every
+def test_neutral_values_change_nothing(entry):
+    if entry.neutral is None:
+        pytest.skip("has no neutral values")
+    np.testing.assert_allclose(signals(example(entry, **entry.neutral)), signals(), rtol=1e-12, atol=1e-15)
+
+
+@every
+def test_the_kernel_in_python_is_the_compiled_one(entry):
+    effect = example(entry)
+    kernels = [entry.kernel] + ([entry.inverse] if entry.inverse else [])
+    for kernel in kernels:
+        p = effect.vector()
+        plain, fast = effect.initial_state(), effect.initial_state()
+        for w in MOTION[1700:2300]:
+            ours, theirs = w.copy(), w.copy()
+            kernel.python(p, plain, ours)
+            kernel(p, fast, theirs)
+            np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-15)
+        np.testing.assert_allclose(plain, fast, rtol=1e-9, atol=1e-15)
+
+
+@every
+def test_it_goes_through_its_dictionary_unchanged(entry):
+    effect = example(entry)
+    text = effect.to_dict()
+    assert text["name"] == entry.name
+    again = physics.build(text)
+    assert type(again) is entry
+    assert again == effect
+    assert again.to_dict() == text
+    np.testing.assert_array_equal(again.vector(), effect.vector())
+    assert type(effect).__name__ in repr(effect)
+
+
+def wrong_values(parameter):
+    yield math.nan
+    yield math.inf
+    yield -math.inf
+    yield parameter.high * 2
+    yield parameter.low if parameter.open_low else parameter.low - max(1.0, abs(parameter.low))
+
+
+@every
+def test_wrong_values_are_refused_by_name_value_and_range(entry):
+    text = example(entry).to_dict()
+    places = [((p.name,), p) for p in entry.parameters]
+    if entry.element:
+        list_name = next((key for key, value in text.items() if isinstance(value, list)), None)
+        if list_name:
+            places += [((list_name, 0, p.name), p) for p in entry.element]
+    for path, parameter in places:
+        for value in wrong_values(parameter):
+            with pytest.raises(ConfigError) as caught:
+                physics.build(put(text, path, value))
+            message = str(caught.value)
+            assert parameter.name in message and f"{value:g}" in message
+            assert f"{parameter.low:g}, {parameter.high:g}]" in message
+            assert "\n" not in message
+        for value in ("many", None, True, [1.0]):
+            with pytest.raises(ConfigError, match=parameter.name):
+                physics.build(put(text, path, value))
+        misspelt = put(text, path, None)
+        pick(misspelt, path[:-1]).pop(path[-1])
+        pick(misspelt, path[:-1])[parameter.name + "x"] = 1.0
+        with pytest.raises(ConfigError, match=f"unknown parameter '{parameter.name}x'.*{parameter.name}"):
+            physics.build(misspelt)
+
+
+@every
+def test_a_missing_parameter_is_named(entry):
+    for parameter in entry.parameters:
+        text = example(entry).to_dict()
+        del text[parameter.name]
+        if parameter.default is None:
+            with pytest.raises(ConfigError, match=rf"'{parameter.name}' \(.+\) is missing"):
+                physics.build(text)
+        else:
+            assert physics.build(text).values[parameter.name] == parameter.default
+
+
+@every
+@settings(max_examples=8, suppress_health_check=[HealthCheck.too_slow])
+@given(seed=st.integers(0, 2**31), size=st.sampled_from([1e-9, 1e-6, 1e-4, 1e-2]))
+def test_state_and_output_stay_bounded_under_any_motion(entry, seed, size):
+    random = np.random.default_rng(seed)
+    jumps = size * random.standard_normal(3000) * (random.random(3000) > 0.3)
+    x = np.cumsum(jumps)
+    x -= np.clip(x, -1e-2, 1e-2) * (random.random(3000) > 0.95)
+    effect = example(entry)
+    p, s = effect.vector(), effect.initial_state()
+    states = []
+    rows = motion_rows(
+        np.clip(x, -1e-2, 1e-2), 10.0 ** random.uniform(-6, 0), 10 * random.standard_normal(3000)
+    )
+    rows[:, VELOCITY] *= random.choice([1.0, 0.3, -1.0, 0.0], 3000, p=[0.7, 0.1, 0.1, 0.1])
+    rows[:, NOISE] = random.standard_normal(3000)
+    rows[:, VELOCITY] = np.clip(rows[:, VELOCITY], -10.0, 10.0)
+    for w in rows:
+        entry.kernel(p, s, w)
+        assert np.all(np.isfinite(w)) and np.all(np.isfinite(s))
+        states.append(np.abs(s))
+    # Bounded means that going on does not make it larger: nothing accumulates.
+    before, after = np.max(states[:1500], axis=0), np.max(states[1500:], axis=0)
+    assert np.all(after <= np.maximum(20 * before, np.max(before, initial=0.0)))
+    assert np.max(np.abs(rows[:, [DRIVE, PUSH, FRICTION]])) < 1e7
+
+
+@every
+def test_stiffness_and_damping_bound_the_forces(entry):
+    """The integrator takes its step from them."""
+    effect = example(entry)
+    p, s = effect.vector(), effect.initial_state()
+    assert effect.stiffness() >= 0.0 and effect.damping() >= 0.0
+
+    def force(w, moved, speed):
+        w, state = w.copy(), s.copy()
+        w[MOVED], w[VELOCITY], w[STEP] = moved, speed, 0.0
+        w[POSITION] += moved
+        w[DRIVE] = w[PUSH] = w[FRICTION] = 0.0
+        w[REACH] = w[SCALE] = 1.0
+        entry.kernel(p, state, w)
+        return w[DRIVE] + w[PUSH] - w[FRICTION]
+
+    for k, w in enumerate(MOTION):
+        entry.kernel(p, s, w.copy())
+        if k % 7 == 0:
+            still = force(w, 0.0, 0.0)
+            for nudge in (1e-9, -1e-9):
+                slope = abs(force(w, nudge, 0.0) - still) / 1e-9
+                assert slope <= 1.01 * effect.stiffness() + 1e-3
+            for speed in (1e-6, -1e-6):
+                assert abs(force(w, 0.0, speed) - still) / 1e-6 <= 1.01 * effect.damping() + 1e-3
+
+
+@every
+def test_its_inverse_cancels_it(entry):
+    if entry.inverse is None:
+        pytest.skip("has no inverse")
+    effect = example(entry)
+    p = effect.vector()
+    forward, backward = effect.initial_state(), effect.initial_state()
+    wire = VOLTS if entry.place is Place.DRIVE else SENSED
+    changed = 0.0
+    for w in MOTION:
+        there = w.copy()
+        entry.inverse(p, backward, there)
+        changed = max(changed, abs(there[wire] - w[wire]))
+        entry.kernel(p, forward, there)
+        np.testing.assert_allclose(there, w, rtol=1e-9, atol=1e-12)
+    assert changed > 0.0
+
+
+def test_only_signals_on_their_way_have_an_inverse():
+    for entry in ENTRIES:
+        assert entry.inverse is None or entry.place in (Place.DRIVE, Place.SENSOR)
+
+
+@every
+def test_its_parameters_come_back_from_data_made_with_it(entry):
+    """Least squares on what the kernel gives with 0.1 % noise, from a start 3 % off."""
+    text = {**copy.deepcopy(dict(entry.example)), "name": entry.name}
+    paths = []
+    for path in leaves(text):
+        try:
+            moved = [signals(physics.build(put(text, path, pick(text, path) * f))) for f in (1.03, 0.97)]
+        except ConfigError:
+            assert path[-1] == "weight", f"{path}: only weights, which sum to 1, cannot be moved alone"
+            continue
+        if all(np.array_equal(m, signals(physics.build(text))) for m in moved):
+            assert path[-1] == "reach", f"{path}: only a reach beyond the level may be without effect"
+            continue
+        paths.append(path)
+    truth = np.array([pick(text, path) for path in paths])
+    assert len(paths) > 0 and np.all(truth != 0.0)
+    without, clean = signals(), signals(physics.build(text))
+    spread = np.std(clean - without, axis=0)
+    spread = np.where(spread > 0, spread, np.max(np.abs(clean - without), axis=0))
+    used = spread > 0
+    random = np.random.default_rng(7)
+    data = clean[:, used] + 1e-3 * spread[used] * random.standard_normal((len(clean), int(used.sum())))
+
+    def residual(ratios):
+        guess = text
+        for path, value in zip(paths, truth * ratios, strict=True):
+            guess = put(guess, path, float(value))
+        return ((signals(physics.build(guess))[:, used] - data) / (1e-3 * spread[used])).ravel()
+
+    noise = np.mean(residual(np.ones(len(truth))) ** 2)
+    start = 1.0 + 0.03 * np.where(np.arange(len(truth)) % 2, -1.0, 1.0)
+
+    def polish(at):
+        low, high = np.full(len(at), 0.9), np.full(len(at), 1.1)
+        return least_squares(residual, at, bounds=(low, high), diff_step=1e-4, loss="soft_l1", max_nfev=60).x
+
+    found = polish(start)
+    if np.mean(residual(found) ** 2) > 1.2 * noise:  # a cost with steps in it: scan, finer each time
+        found = start.copy()
+        for width in (0.05, 0.005, 0.0005):
+            for i in range(len(found)):
+                offsets = width * np.linspace(-1, 1, 52)
+                trials = [np.where(np.arange(len(found)) == i, found + d, found) for d in offsets]
+                found = min(trials, key=lambda r: float(np.mean(residual(r) ** 2)))
+        found = polish(found)
+    assert np.max(np.abs(found - 1.0)) < 0.01, dict(zip(map(str, paths), found, strict=True))
