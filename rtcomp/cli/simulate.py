@@ -78,7 +78,7 @@ def simulate(
             "position_max_m": float(position.max()),
             "tracking_rms_m": None
             if data is not None
-            else float(np.sqrt(np.mean(run.tracking_error() ** 2))),
+            else float(np.sqrt(np.mean(run.tracking_error()[1] ** 2))),
         }
         page = simulated_page(chosen, run, open_loop=data is not None)
         finish(out, work, chosen, "simulated", simulated_rows(chosen, run), summary, page, as_json)

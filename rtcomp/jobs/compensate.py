@@ -24,7 +24,7 @@ class Tracking:
     @classmethod
     def of(cls, run: Run, settle: float) -> Tracking:
         """Judge a run, its first `settle` seconds left out."""
-        error = run.tracking_error(settle)
+        error = run.tracking_error(settle)[1]
         return cls(float(np.sqrt(np.mean(error**2))), float(np.abs(error).max()))
 
 

@@ -136,7 +136,9 @@ def friction(config: Configuration, run: Run) -> Friction:
     smoothing = config.run.identify.smoothing if config.run.identify is not None else 0.0
     # Judged as measured: only where noise asked for a low cut-off does the judgement smooth as well.
     smoothing = smoothing if 0.0 < smoothing < bandwidth(run.rate_hz) else 0.0
-    return friction_of(config.stage, c["time"], c["position"], c["voltage"], run.delay_ticks, smoothing)
+    return friction_of(
+        config.stage, c["time"], c["position"], c["voltage"], run.delay_ticks, smoothing, run.doubtful
+    )
 
 
 def learned_positions(config: Configuration, run: Run) -> Floats:
@@ -192,7 +194,15 @@ def _from_recording(
     learn_end = learning_window(config)[1]
     model = model_of(config, learned.tick, position[time <= learn_end])
     smoothing = config.identify.smoothing
-    own = friction_of(config.stage, time, position, recording.voltage, section.delay_ticks, smoothing)
+    own = friction_of(
+        config.stage,
+        time,
+        recording.position,
+        recording.voltage,
+        section.delay_ticks,
+        smoothing,
+        ~recording.trusted,
+    )
     window = config.run.judge.window
     settle = config.run.judge.settle
     first = config.identify.learn[0] if config.identify.learn is not None else 0.0

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from rtcomp.hysteresis.basis import Basis, regressors
 from rtcomp.hysteresis.model import HysteresisModel
@@ -15,11 +17,15 @@ from rtcomp.stage.stage import Stage
 
 @dataclass(frozen=True)
 class Friction:
-    """What a recording says of friction: time (s), position (m) and force (N), each (K,)."""
+    """What a recording says of friction: time (s), position (m) and force (N), each (K,).
+
+    `good` tells the rows that count: those measured as they were timed, and not near any that were not.
+    """
 
     time: Floats
     position: Floats
     force: Floats
+    good: npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -37,16 +43,31 @@ class Judgement:
 
 
 def friction_of(
-    stage: Stage, time: Floats, position: Floats, voltage: Floats, delay_ticks: int, smoothing_hz: float = 0.0
+    stage: Stage,
+    time: Floats,
+    position: Floats,
+    voltage: Floats,
+    delay_ticks: int,
+    smoothing_hz: float = 0.0,
+    doubtful: npt.NDArray[np.bool_] | None = None,
 ) -> Friction:
     """Return the friction force along a recording: what the drive gave less what else it moved.
 
     The force around a row is the mean of the commands that acted before and after it. Velocity and
     acceleration come from the position below a tenth of the rate (at most 100 Hz) or `smoothing_hz`; the
     position that a model shall be driven with is smoothed only where `smoothing_hz` is given.
-    Nothing is delayed: the filters run forward and backward.
+    Nothing is delayed: the filters run forward and backward. `doubtful` rows (late, stale, outliers) are
+    bridged by straight lines, and they and their neighbours, as far as the filters reach, do not count.
     """
     period = float((time[-1] - time[0]) / (time.size - 1))
+    good = np.ones(time.size, dtype=np.bool_)
+    if doubtful is not None and doubtful.any():
+        position = np.interp(time, time[~doubtful], position[~doubtful])
+        reach = (
+            2 * math.ceil(1.0 / (period * 2 * math.pi * (smoothing_hz or bandwidth(1.0 / period))))
+            + delay_ticks
+        )
+        good = np.convolve(doubtful, np.ones(2 * reach + 1), mode="same") < 0.5
     acts = np.concatenate([np.full(delay_ticks, voltage[0]), voltage[: voltage.size - delay_ticks]])
     before = np.append(acts[:1], acts[:-1])
     cut = smoothing_hz or bandwidth(1.0 / period)
@@ -56,7 +77,7 @@ def friction_of(
     acceleration[1:-1] = (slow[2:] - 2 * slow[1:-1] + slow[:-2]) / period**2
     force = stage.force_constant * 0.5 * (acts + before)
     force = force - stage.mass * acceleration - known_force(stage, time, slow, velocity)
-    return Friction(time, slow if smoothing_hz else position, force)
+    return Friction(time, slow if smoothing_hz else position, force, good)
 
 
 def judge(
@@ -67,7 +88,7 @@ def judge(
     The model is run from the first row, in the virgin state, so that its memory has seen all of the motion.
     """
     force = model.response(friction.position)
-    counted = _counted(friction.time, window, settle)
+    counted = _counted(friction, window, settle)
     difference = (friction.force - force)[counted]
     rms = float(np.sqrt(np.mean(difference**2)))
     peak = float(np.abs(friction.force[counted]).max())
@@ -83,7 +104,7 @@ def learning_curve(
     settle: float = 0.0,
 ) -> Floats:
     """Return the relative error of each set of weights in `history` (M, N + 1), frozen, on `friction`."""
-    counted = _counted(friction.time, window, settle)
+    counted = _counted(friction, window, settle)
     x = np.column_stack([regressors(basis, friction.position), np.full(counted.size, offset_scale)])[counted]
     force = friction.force[counted]
     gram, cross, power = x.T @ x, x.T @ force, float(force @ force)
@@ -97,6 +118,7 @@ def reached(basis: Basis, position: Floats) -> Floats:
     return np.asarray(np.ptp(x, axis=0) / (2 * basis.scales()))
 
 
-def _counted(time: Floats, window: tuple[float, float] | None, settle: float) -> np.ndarray:
+def _counted(friction: Friction, window: tuple[float, float] | None, settle: float) -> npt.NDArray[np.bool_]:
+    time = friction.time
     first, last = (time[0], time[-1]) if window is None else window
-    return np.asarray((time >= first + settle) & (time <= last))
+    return np.asarray((time >= first + settle) & (time <= last) & friction.good)

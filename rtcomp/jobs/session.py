@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+import numpy.typing as npt
 from rtcomp_drivers.driver import Bench
 from rtcomp_drivers.registry import create
 
@@ -68,10 +69,21 @@ class Run:
     counters: Mapping[str, int] = field(default_factory=dict)
     recorder: RecorderSummary | None = None
 
-    def tracking_error(self, settle: float = 0.0) -> Floats:
-        """Reference less position (m) after `settle` seconds."""
-        late = self.columns["time"] >= settle
-        return np.asarray((self.columns["reference"] - self.columns["position"])[late])
+    @property
+    def doubtful(self) -> npt.NDArray[np.bool_]:
+        """Rows (K,) whose position was not measured at their time: stale samples, late and lost ticks."""
+        return np.asarray((self.columns["status"] != 0) | (self.columns["overrun"] != 0))
+
+    @property
+    def measured(self) -> npt.NDArray[np.bool_]:
+        """Rows (K,) that hold a new measurement, late or not."""
+        return np.asarray((self.columns["status"] == 0) & (self.columns["overrun"] != 2))
+
+    def tracking_error(self, settle: float = 0.0) -> tuple[Floats, Floats]:
+        """Return time (s) and reference less position (m) of every measurement after `settle` seconds."""
+        rows = self.measured & (self.columns["time"] >= settle)
+        error = (self.columns["reference"] - self.columns["position"])[rows]
+        return self.columns["time"][rows], error
 
 
 def make_device(

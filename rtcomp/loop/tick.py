@@ -56,10 +56,11 @@ one that moved faster than the axis may."""
 ) = range(11)
 """Settings: s, N/V, kg, N s/m, m, m, m, m/s, ticks, m (regressor of the offset), 1 for closed loop."""
 
-SEEN, X1, X2, LEARNED_AT, EXCESS, FAULT, COMPUTED, UPDATES, HISTORY = range(9)
-"""State: samples seen; positions one and two ticks ago (m); position at the last update (m); what the limits
-cut from the last command (V); what the check found; execution time of the last tick (us); updates of the
-weights; from here on the commands of the last ticks, newest first (V)."""
+GOOD, X1, X2, LAST_REFERENCE, LEARNED_AT, EXCESS, FAULT, COMPUTED, UPDATES, STARTED, HISTORY = range(11)
+"""State: good samples in a row until now; positions one and two ticks ago (m); reference one tick ago (m);
+position at the last update (m); what the limits cut from the last command (V); what the check found;
+execution time of the last tick (us); updates of the weights; whether there was a sample; from here on the commands of
+the last ticks, newest first (V)."""
 
 
 class Identifier(NamedTuple):
@@ -123,16 +124,24 @@ def tick_kernel(
     plan: Floats, i: Identifier, c: Compensator, settings: Floats, state: Floats, row: Floats,
     header: np.ndarray, rows: Floats,
 ) -> float:  # fmt: skip
-    """One tick; `row` comes with time, position and timing filled in. Returns the command (V)."""
+    """One tick; `row` comes with time, position and timing filled in. Returns the command (V).
+
+    A sample that is not new (status other than 0) is no measurement: the axis is taken to have moved as
+    the reference did, so that feedback neither kicks nor stops, and nothing is learned until enough good
+    samples have come in a row.
+    """
     position = row[_POSITION]
     row[_REFERENCE] = plan[REFERENCE]
     row[_LEARNING] = 0.0
+    fresh = row[_STATUS] == 0.0
+    if not fresh and state[STARTED] > 0.0:
+        position = state[X1] + plan[REFERENCE] - state[LAST_REFERENCE]
     state[FAULT] = OK
     if not math.isfinite(position):
         state[FAULT] = NOT_FINITE
     elif position < settings[TRAVEL_LOW] or position > settings[TRAVEL_HIGH]:
         state[FAULT] = TRAVEL
-    elif state[SEEN] > 0.0 and abs(position - state[X1]) > settings[SPEED_LIMIT] * settings[PERIOD]:
+    elif state[GOOD] > 0.0 and abs(position - state[X1]) > settings[SPEED_LIMIT] * settings[PERIOD]:
         state[FAULT] = SPEED
     if state[FAULT] != OK:
         c.limit_s[0] = 0.0
@@ -140,16 +149,20 @@ def tick_kernel(
         push(header, rows, row)
         return 0.0
 
-    if state[SEEN] == 0.0:
+    if state[STARTED] == 0.0:
+        state[STARTED] = 1.0
         settle(i.sections, i.position_memory, position)
         state[LEARNED_AT] = position
-        state[X1] = position
-    # A sample that is late or old tells nothing about the slot it stands in: the identifier waits.
-    if state[SEEN] >= 2.0 and row[_OVERRUN] == 0.0 and row[_STATUS] == 0.0:
-        identify(i, settings, state, plan[KNOWN], plan[LEARN], row)
+    if fresh and row[_OVERRUN] == 0.0:
+        # The commands around the last sample are known to have acted as they were timed.
+        if state[GOOD] >= 2.0 + settings[DELAY]:
+            identify(i, settings, state, plan[KNOWN], plan[LEARN], row)
+        state[GOOD] += 1.0
+    else:
+        state[GOOD] = 0.0
     state[X2] = state[X1]
     state[X1] = position
-    state[SEEN] += 1.0
+    state[LAST_REFERENCE] = plan[REFERENCE]
 
     feedback = plan[VOLTS]
     if settings[CLOSED] > 0.0:
@@ -184,7 +197,9 @@ def lost_kernel(plan: Floats, row: Floats, state: Floats, header: np.ndarray, ro
     row[_REFERENCE] = plan[REFERENCE]
     row[_LEARNING] = 0.0
     # What came before the gap is no neighbour of what comes after it.
-    state[SEEN] = 1.0
+    state[GOOD] = 0.0
+    state[X1] += plan[REFERENCE] - state[LAST_REFERENCE]
+    state[LAST_REFERENCE] = plan[REFERENCE]
     push(header, rows, row)
 
 

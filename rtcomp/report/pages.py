@@ -60,6 +60,8 @@ def timing_rows(*runs: Run) -> list[Row]:
             )
         )
         rows.append(Row("Slots lost", f"{sum(r.outcome.lost for r in runs):,}"))
+        stale = sum(int(np.count_nonzero(r.columns["status"])) for r in runs)
+        rows.append(Row("Samples missing", f"{stale:,}", "", "no reply in time; an older one was used"))
         rows.append(Row("Lateness, median", float(np.median(late)) * 1e-6, "s"))
         rows.append(Row("Lateness, 99 %", float(np.percentile(late, 99)) * 1e-6, "s"))
         rows.append(Row("Scheduling", runs[-1].realtime.get("scheduling_class", "unknown")))
@@ -176,7 +178,7 @@ def demo_rows(done: Demonstrated) -> list[Row]:
 
 def live_tracking(done: Demonstrated) -> tuple[float, float]:
     """Return the rms tracking error (m) of the live run before feedforward and at its end."""
-    time, error = done.live.columns["time"], done.live.tracking_error()
+    time, error = done.live.tracking_error()
     before = error[(time > SWITCH_AT - 3.0) & (time < SWITCH_AT)]
     after = error[time > max(time[-1] - 3.0, SWITCH_AT + FADE)]
     return float(np.sqrt(np.mean(before**2))), float(np.sqrt(np.mean(after**2)))
@@ -187,12 +189,9 @@ def demo_page(done: Demonstrated) -> Page:
     i, k = done.identified, done.compensated
     judged = i.held_out or i.in_sample
     unit = for_axis("m", i.config.stage.axis)
-    c = done.live.columns
-    switched = c["time"] >= SWITCH_AT
-    error = done.live.tracking_error()
-    watched = tracking_figure(
-        (c["time"][~switched], error[~switched]), (c["time"][switched], error[switched]), unit=unit
-    )
+    time, error = done.live.tracking_error()
+    on = time >= SWITCH_AT
+    watched = tracking_figure((time[~on], error[~on]), (time[on], error[on]), unit=unit)
     says = f"One run: the model learns from the start; from {SWITCH_AT:g} s on it is fed forward."
     return Page(
         title="Friction hysteresis, identified and compensated",
@@ -219,11 +218,8 @@ def demo_page(done: Demonstrated) -> Page:
 def tracking_section(done: Compensated) -> Section:
     """Return the tracking error without and with feedforward."""
     settle = done.config.run.compensate.settle
-    curves = []
-    for run in (done.without, done.with_it):
-        late = run.columns["time"] >= settle
-        curves.append((run.columns["time"][late], run.tracking_error(settle)))
-    figure = tracking_figure(curves[0], curves[1], unit=for_axis("m", done.config.stage.axis))
+    before, after = done.without.tracking_error(settle), done.with_it.tracking_error(settle)
+    figure = tracking_figure(before, after, unit=for_axis("m", done.config.stage.axis))
     return Section("Tracking error without and with", "The same reference, the same controller.", figure)
 
 
