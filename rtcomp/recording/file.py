@@ -30,7 +30,8 @@ CHUNK_ROWS = 2048
 WEIGHTS_PERIOD = 0.1
 """s between two stored rows of weights."""
 _WEIGHTS_CHUNK = 64
-_ENDED_BYTES = 64
+TEXT_BYTES = 64
+"""Room in an attribute whose text is set while the file is written: SWMR lets values change, not sizes."""
 
 
 class RecordingFile:
@@ -44,10 +45,12 @@ class RecordingFile:
         weights: int = 0,
         axis: str = "linear",
         overwrite: bool = False,
+        later: Sequence[str] = (),
     ) -> None:
         """Create the file; raise OutputExistsError where there is one, OSError where the disk refuses.
 
-        With `overwrite`, one that is there is replaced once the new one stands.
+        With `overwrite`, one that is there is replaced once the new one stands. `later` names attributes
+        (short texts) whose values `fill` sets when they are known.
         """
         self._descriptor = -1
         temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
@@ -67,7 +70,8 @@ class RecordingFile:
             self._file.attrs["format"] = "rtcomp recording 1"
             self._file.attrs["complete"] = np.int64(0)
             self._file.attrs["rows_lost"] = np.int64(0)
-            self._file.attrs.create("ended", b"no", dtype=f"S{_ENDED_BYTES}")
+            for key, value in {"ended": b"no", **dict.fromkeys(later, b"unknown")}.items():
+                self._file.attrs.create(key, value, dtype=f"S{TEXT_BYTES}")
             self._file.swmr_mode = True  # from here on: no new names, only more rows
             self._descriptor = os.open(temporary, os.O_RDWR | os.O_CLOEXEC)
             fcntl.flock(self._descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -152,7 +156,12 @@ class RecordingFile:
         """Write how the run ended into the root attributes, in place (SWMR allows no new ones)."""
         self._set("complete", np.int64(complete))
         self._set("rows_lost", np.int64(rows_lost))
-        self._set("ended", np.bytes_(ended.encode()[:_ENDED_BYTES]))
+        self.fill({"ended": ended})
+
+    def fill(self, values: Mapping[str, str]) -> None:
+        """Set texts announced as `later`, in place, cut to TEXT_BYTES; the next flush makes them safe."""
+        for name, text in values.items():
+            self._set(name, np.bytes_(text.encode()[:TEXT_BYTES]))
 
     def _set(self, name: str, value: Any) -> None:
         attribute = h5a.open(self._file.id, name.encode())

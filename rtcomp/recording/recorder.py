@@ -46,8 +46,11 @@ class RecorderSummary:
 class Recorder:
     """A running recorder process. Made by `Recorder.start`; never raises into the loop afterwards."""
 
-    def __init__(self, path: Path, ring: Ring, process: subprocess.Popen[bytes]) -> None:
+    def __init__(
+        self, path: Path, ring: Ring, process: subprocess.Popen[bytes], later: Sequence[str] = ()
+    ) -> None:
         self.path = path
+        self._later = frozenset(later)
         self._ring = ring
         self._process = process
         self._summary: RecorderSummary | None = None
@@ -63,6 +66,7 @@ class Recorder:
         flush_s: float = 0.05,
         axis: str = "linear",
         overwrite: bool = False,
+        later: Sequence[str] = (),
         timeout_s: float = 20.0,
     ) -> Recorder:
         """Start recording `ring` into the new HDF5 file `path`; return when the file is open.
@@ -71,18 +75,21 @@ class Recorder:
         are the identifier's weights. `metadata` becomes root attributes (dicts and lists as JSON text);
         `flush_s` (s, at most 0.1) bounds what a kill can cost. With `axis` ``rotary``, units read rad, N m.
 
+        `later` names further root attributes, texts of at most 64 bytes, that `fill` sets once they are
+        known (what is in force when the loop is armed); until then they read ``unknown``.
+
         Raises OutputExistsError where `path` exists and `overwrite` is false, RecordingError where the
         file cannot be made or the recorder does not come up within `timeout_s` seconds, ValueError where
         columns, metadata or `flush_s` do not fit.
         """
         target = Path(path).absolute()
-        _check(ring, columns, metadata, weights_columns, flush_s)
+        _check(ring, columns, [*metadata, *later], weights_columns, flush_s)
         if target.is_dir() or (os.path.lexists(target) and not overwrite):
             raise OutputExistsError(f"{path}: exists already; choose another name or use --force")
         job = {
             "path": str(target), "ring": ring.descriptor, "parent": os.getpid(), "columns": list(columns),
             "weights_columns": weights_columns, "metadata": dict(metadata), "flush_s": flush_s, "axis": axis,
-            "overwrite": overwrite,
+            "overwrite": overwrite, "later": list(later),
         }  # fmt: skip
         line = (json.dumps(job, default=_plain) + "\n").encode()
         process = subprocess.Popen(
@@ -90,12 +97,12 @@ class Recorder:
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
             pass_fds=(ring.descriptor,), start_new_session=True, env=_environment(),
         )  # fmt: skip
-        recorder = cls(target, ring, process)
+        recorder = cls(target, ring, process, later)
         try:
             assert process.stdin is not None
             with contextlib.suppress(BrokenPipeError):  # it died at once; its answer, or silence, says why
                 process.stdin.write(line)
-                process.stdin.close()
+                process.stdin.flush()
             answer = recorder._answer(timeout_s)
         except BaseException:
             recorder._end(0.0)
@@ -120,6 +127,18 @@ class Recorder:
     def rows_flushed(self) -> int:
         """Rows that are safe in the file by now."""
         return int(self._ring.header[FLUSHED])
+
+    def fill(self, values: Mapping[str, str]) -> None:
+        """Set root attributes that `start` announced as `later`; does not wait, and asks no living recorder.
+
+        Raises ValueError for a name that was not announced.
+        """
+        if unknown := [name for name in values if name not in self._later]:
+            raise ValueError(f"attribute {unknown[0]!r} was not announced to Recorder.start as later")
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError, ValueError):  # it has died or is finished; `finish` tells
+            self._process.stdin.write((json.dumps(dict(values)) + "\n").encode())
+            self._process.stdin.flush()
 
     def finish(self, timeout: float = 10.0) -> RecorderSummary:
         """Wait up to `timeout` s for the recorder to write what is left and end; return how it went.
@@ -194,7 +213,7 @@ class Recorder:
 
 
 def _check(
-    ring: Ring, columns: Sequence[str], metadata: Mapping[str, Any], weights_columns: int, flush_s: float
+    ring: Ring, columns: Sequence[str], attributes: Sequence[str], weights_columns: int, flush_s: float
 ) -> None:
     width = ring.rows.shape[1]
     if len(columns) + weights_columns != width:
@@ -205,8 +224,10 @@ def _check(
         raise ValueError("columns begin with time, are named once each, and none is named weights")
     if not 0.0 < flush_s <= LONGEST_FLUSH_S:
         raise ValueError(f"flush_s is {flush_s:g} s; allowed is (0, {LONGEST_FLUSH_S:g}]")
-    if taken := [key for key in metadata if key in _RESERVED]:
-        raise ValueError(f"metadata {taken[0]!r} is a name that the recorder writes itself")
+    if taken := [key for key in attributes if key in _RESERVED or attributes.count(key) > 1]:
+        raise ValueError(
+            f"metadata {taken[0]!r} is there twice, or is a name that the recorder writes itself"
+        )
 
 
 def _plain(value: Any) -> Any:

@@ -26,23 +26,34 @@ DRAIN_S = 0.02
 
 
 class _Parent:
-    """Watches the process that runs the loop: by its pidfd where there is one, always by its number."""
+    """The process that runs the loop: whether it lives, by its pidfd where there is one and always by its
+    number; and what it has to say, lines of JSON on standard input.
+    """
 
     def __init__(self, pid: int) -> None:
         self._pid = pid
         self._descriptor = -1
+        self._input = sys.stdin.fileno()
+        self._text = b""
         if hasattr(os, "pidfd_open"):
             with contextlib.suppress(OSError):  # it has gone already; `gone` sees that by its number
                 self._descriptor = os.pidfd_open(pid)
 
     def gone(self, wait_s: float) -> bool:
-        """Return whether the parent has ended; wait for that up to `wait_s` seconds."""
-        if os.getppid() != self._pid:
-            return True
-        if self._descriptor < 0:
-            time.sleep(wait_s)
-            return os.getppid() != self._pid
-        return bool(select.select([self._descriptor], [], [], wait_s)[0])
+        """Return whether the parent has ended; wait for that, or for words of it, up to `wait_s` seconds."""
+        watched = [d for d in (self._descriptor, self._input) if d >= 0]
+        ready = select.select(watched, [], [], wait_s)[0]
+        return self._descriptor in ready or os.getppid() != self._pid
+
+    def words(self) -> dict[str, str]:
+        """Return what it has said since the last call, without waiting."""
+        while self._input >= 0 and select.select([self._input], [], [], 0.0)[0]:
+            piece = os.read(self._input, 65536)
+            self._text += piece
+            if not piece:
+                self._input = -1
+        *lines, self._text = self._text.split(b"\n")
+        return {name: text for line in lines for name, text in json.loads(line).items()}
 
 
 def _answer(**what: Any) -> None:
@@ -95,6 +106,7 @@ def _record(ring: Ring, file: RecordingFile, parent: _Parent, flush_s: float, as
             ended = "complete" if header[CLOSED] == 1 else "error"
         elif asked:
             ended = ended or "recorder told to end"
+        file.fill(parent.words())
         waiting = ring.waiting
         more = True
         while more:
@@ -122,7 +134,11 @@ def _flush(ring: Ring, file: RecordingFile) -> str:
 def main() -> int:
     """Do the job on standard input; exit status 0 when the recording was closed as it should be."""
     asked = _prepare()
-    job = json.loads(sys.stdin.readline())
+    line = sys.stdin.readline()
+    if not line:
+        print("error: the recorder is started by a run, not by hand", file=sys.stderr)
+        return 2
+    job = json.loads(line)
     parent = _Parent(job["parent"])
     try:
         ring = Ring.attach(job["ring"])
@@ -133,6 +149,7 @@ def main() -> int:
             job["weights_columns"],
             job["axis"],
             job["overwrite"],
+            job["later"],
         )
     except (OSError, RuntimeError) as error:  # the library raises either
         _give_up(error)

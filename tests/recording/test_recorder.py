@@ -116,6 +116,31 @@ def test_it_is_readable_while_it_grows_and_has_one_writer(tmp_path: Path, ring: 
     assert read(path).notes == []
 
 
+def test_what_is_known_only_later_is_filled_in(tmp_path: Path, ring: Ring) -> None:
+    path = tmp_path / "run.h5"
+    names = ["scheduling_class", "priority", "unasked"]
+    recorder = Recorder.start(path, ring, COLUMNS, {}, weights_columns=WEIGHTS, later=names)
+    assert read_attributes(path)["priority"] == b"unknown"
+    recorder.fill({"scheduling_class": "SCHED_FIFO"})
+    write(ring, 0, 100)
+    wait_until_flushed(recorder, 100)
+    time.sleep(0.1)
+    assert read_attributes(path)["scheduling_class"] == b"SCHED_FIFO"  # on disk before any end
+    with pytest.raises(ValueError, match="not announced"):
+        recorder.fill({"speed": "1"})
+    recorder.fill({"priority": "80" + "x" * 100})
+    ring.close()
+    assert recorder.finish().complete
+    recorder.fill({"priority": "99"})  # too late, but no harm
+    attributes = read_attributes(path)
+    assert attributes["priority"] == ("80" + "x" * 62).encode() and attributes["unasked"] == b"unknown"
+
+
+def read_attributes(path: Path) -> dict[str, object]:
+    with h5py.File(path, "r", swmr=True) as file:
+        return dict(file.attrs)
+
+
 def test_a_stopped_recorder_costs_rows_not_the_loop(tmp_path: Path, ring: Ring) -> None:
     recorder = Recorder.start(tmp_path / "run.h5", ring, COLUMNS, {}, weights_columns=WEIGHTS)
     write(ring, 0, 100)
@@ -177,6 +202,12 @@ def test_it_loads_no_compiler_and_says_nothing(tmp_path: Path, ring: Ring) -> No
     code = "import rtcomp.recording.recorder, sys; print({'numba', 'h5py'} & set(sys.modules))"
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert (said.stdout, said.stderr) == ("set()\n", "")
+
+
+def test_by_hand_it_says_one_line() -> None:
+    command = [sys.executable, "-m", "rtcomp.recording.recorder_process"]
+    said = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    assert said.returncode == 2 and said.stderr == "error: the recorder is started by a run, not by hand\n"
 
 
 def test_full_disk_ends_the_recording_in_order(tmp_path: Path, ring: Ring) -> None:
@@ -248,6 +279,7 @@ def test_nothing_is_overwritten_unasked(tmp_path: Path, ring: Ring) -> None:
         {"flush_s": 0.2},
         {"flush_s": 0.0},
         {"metadata": {"complete": 1}},
+        {"metadata": {"priority": 1}, "later": ["priority"]},
     ],
 )
 def test_what_does_not_fit_is_refused(tmp_path: Path, ring: Ring, change: dict[str, object]) -> None:
