@@ -178,7 +178,7 @@ def _one_length(path: Path, table: Table, needed: Sequence[str], rate_hz: float 
         table.notes.append(f"column {name!r} has {len(columns.pop(name))} rows, time has {rows}: left out")
     table.columns = {"time": columns.pop("time"), **columns}
     if rows < MIN_ROWS:
-        raise RecordingError(f"{path}: has {rows} rows; at least {MIN_ROWS} are needed")
+        raise RecordingError(f"{path}: has {_count(rows, 'row')}; at least {MIN_ROWS} are needed")
 
 
 def _check(path: Path, columns: Mapping[str, Floats], needed: Sequence[str]) -> None:

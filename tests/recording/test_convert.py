@@ -187,7 +187,7 @@ def test_a_missing_extra_is_named(
 
 def test_an_unusable_source_leaves_no_target(tmp_path: Path) -> None:
     (tmp_path / "s.csv").write_text("time,position,voltage\n1,2,3\n")
-    with pytest.raises(RecordingError, match="has 1 rows"):
+    with pytest.raises(RecordingError, match="has 1 row;"):
         convert(tmp_path / "s.csv", tmp_path / "a.h5")
     assert [p.name for p in tmp_path.iterdir()] == ["s.csv"]
 
