@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rtcomp.errors import ConfigError
@@ -44,18 +44,21 @@ def one(name, wire, rows=None, parameters=None, **wires):
 VOLT = st.floats(-20, 20)
 
 
+@settings(deadline=None)
 @given(u=VOLT, width=st.floats(0, 5))
 def test_deadband_is_odd_continuous_and_shifted(u, width):
     out = one("drive-deadband", VOLTS, parameters={"width": width}, u=u)
     assert out == pytest.approx(math.copysign(max(abs(u) - width, 0), u))
 
 
+@settings(deadline=None)
 @given(u=VOLT)
 def test_saturation_and_offset(u):
     assert one("drive-saturation", VOLTS, parameters={"limit": 5.0}, u=u) == min(max(u, -5.0), 5.0)
     assert one("drive-offset", VOLTS, parameters={"offset": 0.25}, u=u) == u + 0.25
 
 
+@settings(deadline=None)
 @given(pieces=st.integers(1, 50), constant=st.floats(1e-5, 1.0))
 def test_lag_is_exact_for_a_held_voltage_however_the_step_is_split(pieces, constant):
     rows = new_rows(pieces)
@@ -130,6 +133,7 @@ def test_position_dependent_friction_never_drives():
     assert one("position-dependent-friction", SCALE, parameters=parameters, x=-1.0) == 0.0
 
 
+@settings(deadline=None)
 @given(x=st.floats(-1e-3, 1e-3), resolution=st.floats(1e-9, 1e-5))
 def test_resolution_rounds_to_the_nearest_count(x, resolution):
     y = one("sensor-resolution", SENSED, parameters={"resolution": resolution}, y=x)
@@ -142,6 +146,7 @@ def test_sensor_scale_is_true_over_believed_length():
     assert one("sensor-noise", SENSED, parameters={"rms": 2.0}, y=1.0, noise=-1.5) == -2.0
 
 
+@settings(deadline=None)
 @given(reading=st.floats(-1e-3, 1e-3), share=st.floats(-0.95, 0.95))
 def test_periodic_error_is_undone_as_long_as_readings_are_unique(reading, share):
     effect = build(

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rtcomp.errors import ConfigError
@@ -40,6 +40,7 @@ def test_negative_strokes_mirror_positive_ones():
     assert np.max(np.abs(force(x, viscous=0.0))) <= 4.0
 
 
+@settings(deadline=None)
 @given(path=st.lists(st.floats(-2e-5, 2e-5), min_size=1, max_size=12))
 def test_with_one_level_it_is_the_maxwell_slip_bank(path):
     bank = MaxwellSlip([(k, weight * 3.0 / k) for k, weight in ELEMENTS])
@@ -67,6 +68,7 @@ def test_friction_is_higher_while_speeding_up_than_while_slowing_down():
     assert f[middle & up].mean() > f[middle & ~up].mean() + 0.02
 
 
+@settings(deadline=None)
 @given(
     moves=st.lists(st.tuples(st.floats(-1e-4, 1e-4), st.integers(2, 15)), min_size=1, max_size=6),
 )

@@ -33,6 +33,7 @@ def test_virgin_curve_is_the_sum_of_the_elements():
     np.testing.assert_allclose(force(x), virgin(x), rtol=1e-12, atol=1e-12)
 
 
+@settings(deadline=None)
 @given(turn=st.floats(0.1e-6, 10e-6), back=st.floats(0.0, 1.0))
 def test_masing_branches_are_the_virgin_curve_doubled(turn, back):
     target = turn - 2 * turn * back
@@ -40,6 +41,7 @@ def test_masing_branches_are_the_virgin_curve_doubled(turn, back):
     assert force([turn, target])[-1] == pytest.approx(expected, abs=1e-9)
 
 
+@settings(deadline=None)
 @given(path=PATHS, inner=st.lists(st.floats(0, 1), min_size=1, max_size=5))
 def test_wiping_out_a_closed_inner_loop_leaves_nothing(path, inner):
     low, high = min([0.0, *path]), max([0.0, *path])
@@ -51,6 +53,7 @@ def test_wiping_out_a_closed_inner_loop_leaves_nothing(path, inner):
     )
 
 
+@settings(deadline=None)
 @given(one=PATHS, other=PATHS, low=st.floats(-4e-6, 0), size=st.floats(0.2e-6, 4e-6))
 def test_congruency_loops_between_the_same_turning_points_have_the_same_shape(one, other, low, size):
     loop = [low, low + size, *np.linspace(low + size, low, 9), *np.linspace(low, low + size, 9)]
@@ -58,6 +61,7 @@ def test_congruency_loops_between_the_same_turning_points_have_the_same_shape(on
     np.testing.assert_allclose(first - first[0], second - second[0], atol=1e-9)
 
 
+@settings(deadline=None)
 @given(path=PATHS)
 def test_a_closed_loop_dissipates(path):
     corners = np.array([*path, *path, path[0]])
@@ -69,11 +73,13 @@ def test_a_closed_loop_dissipates(path):
     assert np.sum(np.diff(x) * (f[1:] + f[:-1]) / 2) >= -0.02 * BANK.level * 1e-6
 
 
+@settings(deadline=None)
 @given(path=PATHS, factor=st.floats(1e-3, 1e3))
 def test_rate_independent(path, factor):
     assert force(path, step=1e-3).tolist() == force(path, step=1e-3 * factor).tolist()
 
 
+@settings(deadline=None)
 @given(path=PATHS, pieces=st.integers(2, 30))
 def test_splitting_a_displacement_changes_nothing(path, pieces):
     corners = [0.0, *path]
@@ -94,7 +100,7 @@ def test_a_stiff_element_is_right_at_a_coarse_step():
     assert np.mean(np.abs(coarse - fine) > 1e-6) < 0.03
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(reach=st.floats(0.1, 5), scale=st.floats(0.1, 5), x=MICROMETRES)
 def test_reach_widens_and_scale_multiplies(reach, scale, x):
     rows = motion_rows(np.array([x]), 1e-3)

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -54,6 +54,7 @@ def test_dahl_with_exponent_0_is_one_stop_element():
     np.testing.assert_allclose(f, [1.0, 3.0, 2.0, -3.0, -2.0], rtol=1e-12)
 
 
+@settings(deadline=None)
 @given(
     exponent=st.floats(0, 5),
     path=st.lists(st.floats(-1e-4, 1e-4), min_size=1, max_size=8),
@@ -104,6 +105,7 @@ def test_lugre_solves_its_equation_at_changing_speed():
     np.testing.assert_allclose(force(effect, position, duration / count), expected, atol=0.02)
 
 
+@settings(deadline=None)
 @given(step=st.floats(1e-6, 1.0), speed=st.floats(1e-4, 1.0))
 def test_lugre_never_leaves_its_level_in_sliding_however_long_the_step(step, speed):
     """An explicit step diverges where dt > 2 Fc / (stiffness |v|)."""
@@ -113,6 +115,7 @@ def test_lugre_never_leaves_its_level_in_sliding_however_long_the_step(step, spe
     assert np.all(f > 0)
 
 
+@settings(deadline=None)
 @given(path=st.lists(st.floats(-1e-3, 1e-3), min_size=1, max_size=10), factor=st.floats(1e-3, 1e3))
 def test_dahl_is_rate_independent(path, factor):
     effect = Dahl(stiffness=STIFFNESS, coulomb=COULOMB, exponent=1.5)
