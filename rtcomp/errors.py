@@ -10,10 +10,16 @@ RtcompError                 one clear line, exit status 2
     ├── DeviceTimeoutError  it does not answer (also a TimeoutError)
     └── ProtocolError       it answers, but not as the protocol says
 
+Interrupted (a KeyboardInterrupt) stands beside them: nothing is wrong, the user ended a run.
+
 Messages name the thing, the value, the allowed range and what to do; they are one line.
 """
 
 from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
 
 
 class RtcompError(Exception):
@@ -23,7 +29,20 @@ class RtcompError(Exception):
 
 
 class ConfigError(RtcompError, ValueError):
-    """A configuration, stage or model file is wrong; the message names file, line and key."""
+    """A configuration, stage or model file is wrong; the message names file, line and key.
+
+    `key` says which part of what was given is wrong, such as ``("elements", 1, "reach")``, so that whoever
+    knows the file can name the line.
+    """
+
+    def __init__(self, *arguments: Any, key: Iterable[str | int] = ()) -> None:
+        super().__init__(*arguments)
+        self.key: tuple[str | int, ...] = tuple(key)
+
+    def inside(self, *parts: str | int) -> ConfigError:
+        """Return this error with its key seen from further out."""
+        self.key = (*parts, *self.key)
+        return self
 
 
 class RecordingError(RtcompError, ValueError):
@@ -52,3 +71,27 @@ class DeviceTimeoutError(DeviceError, TimeoutError):
 
 class ProtocolError(DeviceError):
     """The device answers, but not as the protocol says."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """A signal ended a run: the loop has stopped in good order, at zero volts.
+
+    With `results`, the folder holds all that the command writes, made from the run up to there.
+    """
+
+    def __init__(self, number: int, says: str = "", results: bool = False) -> None:
+        super().__init__(says)
+        self.number = number
+        self.results = results
+
+    @property
+    def exit_status(self) -> int:
+        """130 for SIGINT, 143 for SIGTERM, as shells have it."""
+        return 128 + self.number
+
+
+def nearest(word: object, known: Iterable[str]) -> str:
+    """Return ``did you mean 'x'?`` for the one of `known` most like `word`, else ``known are x, y``."""
+    names = sorted(known)
+    near = difflib.get_close_matches(str(word), names, n=1, cutoff=0.5)
+    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(names)}"

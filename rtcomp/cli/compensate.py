@@ -9,6 +9,7 @@ import click
 from rtcomp.cli.options import json_option, output_options
 from rtcomp.cli.output import prepare_output
 from rtcomp.cli.runs import device_options, finish, load
+from rtcomp.errors import Interrupted
 
 
 @click.command()
@@ -43,19 +44,25 @@ def compensate(
     from rtcomp.hysteresis.model import HysteresisModel
     from rtcomp.jobs.compensate import compensate as run
     from rtcomp.jobs.identify import identify
+    from rtcomp.jobs.session import check
     from rtcomp.report.pages import compensated_page, compensated_rows
     from rtcomp.report.watch import TerminalWatch
     from rtcomp.units import for_axis
 
     chosen = load(config, port=port, clock=clock, seconds=seconds)
-    chosen.reference("compensate")
     known = HysteresisModel.load(model) if model is not None else None
+    if known is None:
+        chosen.identify  # noqa: B018 -- raises where the section is missing
+    check(chosen, *([] if known is not None else ["", "judge"]), "compensate")
     with prepare_output(out, force) as work:
         titles = ["without", "with"] if known is not None else ["learn", "judge", "without", "with"]
         watch = TerminalWatch(titles, quiet=as_json, unit=for_axis("m", chosen.stage.axis))
         try:
             if known is None:
-                known = identify(chosen, out=work, watch=watch).model
+                learned = identify(chosen, out=work, watch=watch)
+                if learned.signal is not None:
+                    raise Interrupted(learned.signal, learned.notes[-1])
+                known = learned.model
             done = run(chosen, known, out=work, watch=watch)
         finally:
             watch.close()

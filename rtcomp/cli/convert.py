@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
 from rtcomp.cli.options import force_option, json_option, map_option, rate_option
+from rtcomp.cli.runs import to_json
 
 
 @click.command()
@@ -42,7 +42,7 @@ def convert(
             "columns": list(recording.columns),
             "notes": recording.notes,
         }
-        click.echo(json.dumps(summary, indent=2))
+        click.echo(to_json(summary))
         return
     for note in recording.notes:
         click.echo(f"note: {note}")

@@ -9,6 +9,7 @@ import click
 from rtcomp.cli.options import json_option, map_option, output_options
 from rtcomp.cli.output import prepare_output
 from rtcomp.cli.runs import device_options, finish, load
+from rtcomp.errors import Interrupted
 
 
 @click.command()
@@ -43,8 +44,9 @@ def identify(
       rtcomp identify configs/leuven.yaml --port /dev/ttyACM0 --out out/board
     """
     chosen = load(config, port=port, clock=clock, seconds=seconds)
-    chosen.basis()
+    chosen.identify  # noqa: B018 -- raises where the section is missing
     from rtcomp.jobs.identify import identify as run
+    from rtcomp.jobs.session import check
     from rtcomp.recording.reader import read
     from rtcomp.report.pages import identified_page, identified_rows
     from rtcomp.report.watch import TerminalWatch
@@ -54,6 +56,9 @@ def identify(
     if recording is not None:
         section = chosen.run.recording
         data = read(recording, {**section.map, **mapping}, rate_hz=section.rate)
+        chosen.basis()
+    else:
+        check(chosen, "", *(["judge"] if chosen.run.judge.reference is not None else []))
     with prepare_output(out, force) as work:
         watch = TerminalWatch(["learn", "judge"], quiet=as_json, unit=for_axis("m", chosen.stage.axis))
         try:
@@ -68,3 +73,5 @@ def identify(
         if not as_json:
             for note in done.notes:
                 click.echo(f"Note: {note}")
+        if done.signal is not None:
+            raise Interrupted(done.signal, done.notes[-1], results=True)

@@ -1,7 +1,7 @@
 """The command `rtcomp`: finds its commands, and turns every error into one line and an exit status.
 
-Exit status: 0 done, 2 unusable input or a device that fails, 70 a defect of the program, 130 interrupted,
-141 nobody reads the output any more.
+Exit status: 0 done, 2 unusable input or a device that fails, 70 a defect of the program, 130 and 143
+interrupted by SIGINT and SIGTERM, 141 nobody reads the output any more.
 """
 
 from __future__ import annotations
@@ -9,16 +9,18 @@ from __future__ import annotations
 import difflib
 import os
 import select
+import signal
 import sys
 import traceback
 from collections.abc import Sequence
+from types import FrameType
 
 import click
 from click.exceptions import NoArgsIsHelpError
 
 from rtcomp import __version__
 from rtcomp.cli.lazy import LazyGroup
-from rtcomp.errors import RtcompError
+from rtcomp.errors import Interrupted, RtcompError
 
 INTERNAL, INTERRUPTED, BROKEN_PIPE = 70, 130, 141
 
@@ -48,7 +50,14 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line of this process and exit with its status."""
+    signal.signal(signal.SIGTERM, _terminated)
     sys.exit(run(sys.argv[1:]))
+
+
+def _terminated(number: int, _frame: FrameType | None) -> None:
+    # Once: what it sets off, such as keeping what was written, is not to be cut short by a second one.
+    signal.signal(number, signal.SIG_IGN)
+    raise Interrupted(number)
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -69,6 +78,10 @@ def run(arguments: Sequence[str]) -> int:
     except RtcompError as error:
         _trace()
         return _say(_with_notes(error), error.exit_status)
+    except Interrupted as error:
+        return _say(
+            "; ".join(filter(None, ["interrupted", _with_notes(error)])), error.exit_status, prefix=""
+        )
     except (KeyboardInterrupt, click.Abort) as error:
         return _say("; ".join(["interrupted", *_notes(error)]), INTERRUPTED, prefix="")
     except BrokenPipeError as error:

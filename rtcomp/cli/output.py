@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from rtcomp.errors import OutputExistsError, RtcompError
+from rtcomp.errors import Interrupted, OutputExistsError, RtcompError
 
 MANIFEST = ".rtcomp-files"
 """Lists, in an output folder, the files that rtcomp wrote, so that `--force` replaces those and no others."""
@@ -23,7 +23,8 @@ def prepare_output(path: str | Path, force: bool = False) -> Iterator[Path]:
     for. With `force`, an existing one stays as it is until the block has ended well; then the new files take
     the places of the earlier run's, and files that no earlier run wrote stay. If the block fails, what it
     wrote is kept beside `path` under a name ending in ``.failed``, which the error's note tells; an empty
-    folder is removed.
+    folder is removed. A run that a signal has ended, and that has results all the same (see Interrupted),
+    leaves them at `path`, but never in the place of an earlier run's.
 
     Raises OutputExistsError for a folder that is not empty (without `force`) or a file, RtcompError for a
     place that cannot be written.
@@ -40,8 +41,15 @@ def prepare_output(path: str | Path, force: bool = False) -> Iterator[Path]:
         work = path.with_name(f"{path.resolve().name}.new-{os.getpid()}") if occupied else path
         existed = work.is_dir()
         work.mkdir(parents=True, exist_ok=not occupied)
+    interrupted: Interrupted | None = None
     try:
         yield work
+    except Interrupted as error:
+        if occupied or not error.results:
+            _keep_failed(work, path, error, existed)
+            raise
+        error.add_note(f"results up to there are in {path}")
+        interrupted = error
     except BaseException as error:
         _keep_failed(work, path, error, existed)
         raise
@@ -50,6 +58,8 @@ def prepare_output(path: str | Path, force: bool = False) -> Iterator[Path]:
         (work / MANIFEST).write_text("".join(f"{name}\n" for name in written), encoding="utf-8")
         if occupied:
             _replace(path, work, written)
+    if interrupted is not None:
+        raise interrupted
 
 
 @contextlib.contextmanager

@@ -9,7 +9,12 @@ import click
 
 @click.group()
 def plant() -> None:
-    """Stand in for hardware: a simulated stage in its own process, in real time, behind a port."""
+    """Stand in for hardware: a simulated stage in its own process, in real time, behind a port.
+
+    \b
+    Example:
+      rtcomp plant serve --config configs/leuven.yaml --serial
+    """
 
 
 @plant.command()

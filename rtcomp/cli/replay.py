@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
 from rtcomp.cli.options import force_option, json_option, map_option, rate_option
+from rtcomp.cli.runs import to_json
 
 
 @click.command()
@@ -48,7 +48,7 @@ def replay(
     done = run(stage, read(recording, mapping, rate_hz=rate), bandwidth)
     write_csv(out, done.columns, force)
     if as_json:
-        click.echo(json.dumps({**done.summary(), "out": str(out)}, indent=2))
+        click.echo(to_json({**done.summary(), "out": str(out)}))
         return
     from rtcomp.report.page import Row
     from rtcomp.report.terminal import print_summary

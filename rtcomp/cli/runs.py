@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -35,8 +36,8 @@ def load(
 
     config = Configuration.load(path)
     if port is not None:
-        device = {**config.file.data.get("device", {}), "driver": "serial", "port": port}
-        config = config.changed(device={k: v for k, v in device.items() if k != "delay_ticks"})
+        device = config.run.device if config.run.device.get("driver") == "serial" else {}
+        config = config.changed(device={**device, "driver": "serial", "port": port})
     if clock is not None:
         config = config.changed(clock=clock)
     if seconds is not None:
@@ -59,6 +60,19 @@ def lasting(config: Configuration, seconds: float) -> Configuration:
     return config.changed(**changes)
 
 
+def to_json(summary: Mapping[str, Any]) -> str:
+    """Write a summary as one JSON document; a figure that is not a finite number becomes null."""
+    return json.dumps(_finite(dict(summary)), indent=2, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def finish(
     out: Path,
     work: Path,
@@ -73,11 +87,11 @@ def finish(
     from rtcomp.report.page import write_page
     from rtcomp.yamlfile import dump_yaml, write_text
 
-    write_text(work / "summary.json", json.dumps(summary, indent=2) + "\n")
+    write_text(work / "summary.json", to_json(summary) + "\n")
     dump_yaml(work / "configuration.yaml", config.file.data)
     write_page(work / "report.html", page)
     if as_json:
-        click.echo(json.dumps({**summary, "out": str(out)}, indent=2))
+        click.echo(to_json({**summary, "out": str(out)}))
         return
     from rtcomp.report.terminal import print_summary
 

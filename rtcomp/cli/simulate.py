@@ -47,7 +47,8 @@ def simulate(
     """
     import numpy as np
 
-    from rtcomp.jobs.simulate import closed_loop, open_loop
+    from rtcomp.jobs.session import check
+    from rtcomp.jobs.simulate import closed_loop, open_loop, simulated_here
     from rtcomp.recording.reader import read
     from rtcomp.report.pages import simulated_page, simulated_rows
     from rtcomp.report.watch import TerminalWatch
@@ -62,7 +63,7 @@ def simulate(
         data = read(recording, mapping, needed=("time", "voltage"))
         chosen = chosen.changed(rate=data.rate_hz)
     else:
-        chosen.reference()
+        check(simulated_here(chosen), "")
     with prepare_output(out, force) as work:
         watch = TerminalWatch(["simulate"], quiet=as_json)
         path = work / "recording.h5"

@@ -6,13 +6,12 @@ and is nonlinear; the weights are learned and enter linearly. Basis and learner 
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from rtcomp.errors import ConfigError
+from rtcomp.errors import ConfigError, nearest
 from rtcomp.kernels import Floats, Kernel, call_basis, compiled
 
 
@@ -63,6 +62,20 @@ class Basis:
         return cls(**entry)
 
 
+def checked_keys(
+    entry: Mapping[str, Any], owner: str, needed: Sequence[str], optional: Sequence[str] = ()
+) -> None:
+    """Raise ConfigError where a model file's `entry` has a key too many, or one of `needed` is missing."""
+    known = [*needed, *optional]
+    for key in entry:
+        if key not in known:
+            hint = nearest(key, [*known, "weights", "offset", "reached"])
+            raise ConfigError(f"{owner} model: unknown key {key!r}; {hint}", key=(key,))
+    for key in needed:
+        if key not in entry:
+            raise ConfigError(f"{owner} model: key {key!r} is missing", key=(key,))
+
+
 B = TypeVar("B", bound=type[Basis])
 _BASES: dict[str, type[Basis]] = {}
 
@@ -81,9 +94,7 @@ def bases() -> dict[str, type[Basis]]:
 def basis_named(name: str) -> type[Basis]:
     """Return the basis class of that name, or raise ConfigError naming the nearest."""
     if name not in _BASES:
-        near = difflib.get_close_matches(name, _BASES, n=1, cutoff=0.5)
-        hint = f"; did you mean {near[0]!r}?" if near else f"; known are {', '.join(sorted(_BASES))}"
-        raise ConfigError(f"no hysteresis model is named {name!r}{hint}")
+        raise ConfigError(f"no hysteresis model is named {name!r}; {nearest(name, _BASES)}", key=("model",))
     return _BASES[name]
 
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from rtcomp.errors import ConfigError
-from rtcomp.hysteresis.basis import Basis, register_basis
+from rtcomp.hysteresis.basis import Basis, checked_keys, register_basis
 from rtcomp.hysteresis.stop import StopBasis, checked_reaches
 from rtcomp.kernels import Floats, basis_kernel
 
@@ -62,7 +62,9 @@ class ExtendedStopBasis(Basis):
         self.reaches = checked_reaches(reaches, self.name)
         self.travel = float(self.reaches.max()) if travel is None else float(travel)
         if not (np.isfinite(self.travel) and self.travel > 0):
-            raise ConfigError(f"extended-stop model: travel is {self.travel:g} m; it must be above 0")
+            raise ConfigError(
+                f"extended-stop model: travel is {self.travel:g} m; it must be above 0", key=("travel",)
+            )
 
     @classmethod
     def over(cls, count: int, total: float, spacing: float = 1.0) -> ExtendedStopBasis:
@@ -96,6 +98,5 @@ class ExtendedStopBasis(Basis):
     @classmethod
     def from_dict(cls, entry: Mapping[str, Any]) -> ExtendedStopBasis:
         """Build from ``{reaches: [...], travel: ...}``; `travel` may be left out."""
-        if not {"reaches"} <= set(entry) <= {"reaches", "travel"}:
-            raise ConfigError(f"extended-stop model takes 'reaches' and 'travel'; found {sorted(entry)}")
+        checked_keys(entry, cls.name, ["reaches"], ["travel"])
         return cls(**entry)

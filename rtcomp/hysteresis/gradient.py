@@ -45,7 +45,8 @@ class Gradient(Learner):
     def __init__(self, step: float = 0.05) -> None:
         if not 0.0 < step < 2.0:
             raise ConfigError(
-                f"learner gradient: step is {step:g}; allowed is above 0 and below 2 (stability)"
+                f"learner gradient: step is {step:g}; allowed is above 0 and below 2 (stability)",
+                key=("step",),
             )
         self.step = float(step)
 

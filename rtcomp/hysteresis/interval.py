@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from rtcomp.errors import ConfigError
-from rtcomp.hysteresis.basis import Basis, register_basis
+from rtcomp.hysteresis.basis import Basis, checked_keys, register_basis
 from rtcomp.kernels import Floats, basis_kernel, compiled
 
 STARTED, INPUT, DIRECTION, FRONT, AMOUNTS = range(5)
@@ -122,10 +122,14 @@ class IntervalBasis(Basis):
     def __init__(self, widths: Sequence[float] | Floats) -> None:
         self.widths = np.array(widths, dtype=np.float64).reshape(-1)
         if self.widths.size == 0:
-            raise ConfigError("interval model: widths are empty; give at least one interval width (m)")
+            raise ConfigError(
+                "interval model: widths are empty; give at least one interval width (m)", key=("widths",)
+            )
         for i, width in enumerate(self.widths):
             if not (np.isfinite(width) and width > 0):
-                raise ConfigError(f"interval model: widths[{i}] is {width:g} m; a width must be above 0")
+                raise ConfigError(
+                    f"interval model: widths[{i}] is {width:g} m; a width must be above 0", key=("widths", i)
+                )
 
     @classmethod
     def over(cls, count: int, total: float, spacing: float = 1.0) -> IntervalBasis:
@@ -157,6 +161,5 @@ class IntervalBasis(Basis):
     @classmethod
     def from_dict(cls, entry: Mapping[str, Any]) -> IntervalBasis:
         """Build from ``{widths: [...]}``."""
-        if set(entry) != {"widths"}:
-            raise ConfigError(f"interval model takes 'widths'; found {sorted(entry)}")
+        checked_keys(entry, cls.name, ["widths"])
         return cls(entry["widths"])

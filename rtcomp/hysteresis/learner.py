@@ -6,13 +6,14 @@ distance since the last call (learning is driven by displacement, not by time), 
 
 from __future__ import annotations
 
-import difflib
+import inspect
+import numbers
 from collections.abc import Mapping
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from rtcomp.errors import ConfigError
+from rtcomp.errors import ConfigError, nearest
 from rtcomp.hysteresis.basis import Basis
 from rtcomp.kernels import Floats, Kernel, call_basis, call_learner, compiled
 
@@ -64,14 +65,18 @@ def build_learner(entry: Mapping[str, Any]) -> Learner:
     """Build a learner from ``{learner: rls, forgetting: 0.9995, ...}``; raise ConfigError if it cannot be."""
     settings = dict(entry)
     name = settings.pop("learner", None)
-    if name not in _LEARNERS:
-        near = difflib.get_close_matches(str(name), _LEARNERS, n=1, cutoff=0.4)
-        hint = f"; did you mean {near[0]!r}?" if near else f"; known are {', '.join(sorted(_LEARNERS))}"
-        raise ConfigError(f"no learner is named {name!r}{hint}")
-    try:
-        return _LEARNERS[name](**settings)
-    except TypeError as error:
-        raise ConfigError(f"learner {name}: {error}") from error
+    if not isinstance(name, str) or name not in _LEARNERS:
+        wrong = "learner is missing" if name is None else f"no learner is named {name!r}"
+        raise ConfigError(f"{wrong}; {nearest(name, _LEARNERS)}", key=("learner",))
+    known = inspect.signature(_LEARNERS[name]).parameters
+    for key, value in settings.items():
+        if key not in known:
+            raise ConfigError(
+                f"learner {name}: unknown setting {key!r}; {nearest(key, ['learner', *known])}", key=(key,)
+            )
+        if isinstance(value, bool) or not isinstance(value, numbers.Real):
+            raise ConfigError(f"learner {name}: {key} is {value!r}; it must be a number", key=(key,))
+    return _LEARNERS[name](**settings)
 
 
 def learn(

@@ -83,5 +83,7 @@ class Nlms(Learner):
 
 def _checked_step(name: str, step: float) -> float:
     if not 0.0 < step < 2.0:
-        raise ConfigError(f"learner {name}: step is {step:g}; allowed is above 0 and below 2 (stability)")
+        raise ConfigError(
+            f"learner {name}: step is {step:g}; allowed is above 0 and below 2 (stability)", key=("step",)
+        )
     return float(step)

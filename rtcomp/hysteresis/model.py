@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from rtcomp.errors import ConfigError
-from rtcomp.hysteresis.basis import Basis, basis_named, regressors
+from rtcomp.errors import ConfigError, nearest
+from rtcomp.hysteresis.basis import Basis, bases, basis_named, regressors
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.kernels import Floats
 from rtcomp.yamlfile import dump_yaml, load_yaml
@@ -36,10 +36,19 @@ class HysteresisModel:
         if self.weights.size != basis.size:
             raise ConfigError(
                 f"hysteresis model: {basis.size} elements but {self.weights.size} weights; "
-                "give as many of each"
+                "give as many of each",
+                key=("weights",),
+            )
+        if self.reached is not None and self.reached.shape != self.weights.shape:
+            raise ConfigError(
+                f"hysteresis model: {basis.size} elements but {self.reached.size} in reached; "
+                "give as many of each",
+                key=("reached",),
             )
         if not (np.isfinite(self.weights).all() and np.isfinite(self.offset)):
-            raise ConfigError("hysteresis model: weights and offset must be finite numbers")
+            raise ConfigError("hysteresis model: weights and offset must be finite numbers", key=("weights",))
+        if self.reached is not None and not np.isfinite(self.reached).all():
+            raise ConfigError("hysteresis model: reached must be finite numbers", key=("reached",))
 
     def response(self, position: Floats) -> Floats:
         """Return the force (N, (K,)) along a motion (m, (K,)) that starts in the virgin state."""
@@ -69,19 +78,20 @@ class HysteresisModel:
         version = rest.pop("version", VERSION)
         if version != VERSION:
             raise ConfigError(
-                f"hysteresis model: version is {version!r}; this program reads version {VERSION}"
+                f"hysteresis model: version is {version!r}; this program reads version {VERSION}",
+                key=("version",),
             )
         name, weights = rest.pop("model", None), rest.pop("weights", None)
         offset, reached = rest.pop("offset", 0.0), rest.pop("reached", None)
-        if not isinstance(name, str) or weights is None:
-            raise ConfigError("hysteresis model: keys 'model' and 'weights' are needed")
-        try:
-            basis = basis_named(name).from_dict(rest)
-            return cls(basis, np.asarray(weights, dtype=np.float64), offset, reached)
-        except (TypeError, ValueError, KeyError) as error:
-            if isinstance(error, ConfigError):
-                raise
-            raise ConfigError(f"hysteresis model {name!r}: {error}") from error
+        if not isinstance(name, str):
+            wrong = "is missing" if name is None else f"is {name!r}"
+            raise ConfigError(f"hysteresis model: model {wrong}; {nearest(name, bases())}", key=("model",))
+        for key, value in (*rest.items(), ("weights", weights), ("offset", offset), ("reached", reached)):
+            _check_numbers(key, value)
+        basis = basis_named(name).from_dict(rest)  # says of a misspelt key which was meant
+        if weights is None:
+            raise ConfigError("hysteresis model: key 'weights' is missing", key=("weights",))
+        return cls(basis, np.asarray(weights, dtype=np.float64), offset, reached)
 
     def save(self, path: str | Path) -> None:
         """Write the model as YAML, whole or not at all."""
@@ -94,4 +104,20 @@ class HysteresisModel:
         try:
             return cls.from_dict(file.data)
         except ConfigError as error:
-            raise ConfigError(f"{path}: {error}") from error
+            line = f":{file.line(error.key)}" if error.key else ""
+            raise ConfigError(f"{path}{line}: {error}", key=error.key) from error
+
+
+def _check_numbers(key: str, value: Any) -> None:
+    """Raise ConfigError where `value`, of a model file, is neither a number nor a list of numbers."""
+    single = key in ("offset", "travel", "reach", "divisions")
+    wanted = "a number" if single else "a list of numbers"
+    if value is None and key in ("weights", "reached"):
+        return
+    if not single and not isinstance(value, list | tuple | np.ndarray):
+        raise ConfigError(f"hysteresis model: {key} is {value!r}; it must be {wanted}", key=(key,))
+    for i, item in enumerate([value] if single else value):
+        if isinstance(item, bool) or not isinstance(item, int | float | np.number):
+            where = (key,) if single else (key, i)
+            name = key if single else f"{key}[{i}]"
+            raise ConfigError(f"hysteresis model: {name} is {item!r}; it must be a number", key=where)

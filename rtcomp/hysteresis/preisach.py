@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from rtcomp.errors import ConfigError
-from rtcomp.hysteresis.basis import Basis, register_basis
+from rtcomp.hysteresis.basis import Basis, checked_keys, register_basis
 from rtcomp.kernels import Floats, basis_kernel, compiled
 
 STARTED, ORIGIN, INPUT, DIRECTION, COUNT, EXTREMES = range(6)
@@ -171,10 +171,11 @@ class PreisachBasis(Basis):
     def __init__(self, divisions: int, reach: float) -> None:
         if isinstance(divisions, bool) or int(divisions) != divisions or not 1 <= divisions <= 200:
             raise ConfigError(
-                f"preisach model: divisions is {divisions}; allowed is a whole number, 1 to 200"
+                f"preisach model: divisions is {divisions}; allowed is a whole number, 1 to 200",
+                key=("divisions",),
             )
         if not (np.isfinite(reach) and reach > 0):
-            raise ConfigError(f"preisach model: reach is {reach:g} m; it must be above 0")
+            raise ConfigError(f"preisach model: reach is {reach:g} m; it must be above 0", key=("reach",))
         self.divisions = int(divisions)
         self.reach = float(reach)
 
@@ -185,7 +186,10 @@ class PreisachBasis(Basis):
         Give the range of the motion: unlike the other operators the plane does not move along with it.
         """
         if spacing != 1.0:
-            raise ConfigError(f"preisach model: spacing is {spacing:g}; its cells are equal, so it must be 1")
+            raise ConfigError(
+                f"preisach model: spacing is {spacing:g}; its cells are equal, so it must be 1",
+                key=("spacing",),
+            )
         return cls(max(int((np.sqrt(8.0 * count + 1.0) - 1.0) / 2.0), 1), 0.5 * total)
 
     @property
@@ -222,6 +226,5 @@ class PreisachBasis(Basis):
     @classmethod
     def from_dict(cls, entry: Mapping[str, Any]) -> PreisachBasis:
         """Build from ``{divisions: ..., reach: ...}``."""
-        if set(entry) != {"divisions", "reach"}:
-            raise ConfigError(f"preisach model takes 'divisions' and 'reach'; found {sorted(entry)}")
+        checked_keys(entry, cls.name, ["divisions", "reach"])
         return cls(**entry)

@@ -64,9 +64,11 @@ class Rls(Learner):
 
     def __init__(self, forgetting: float = 0.9999, trust: float = 100.0) -> None:
         if not 0.9 <= forgetting <= 1.0:
-            raise ConfigError(f"learner rls: forgetting is {forgetting:g}; allowed is 0.9 to 1")
+            raise ConfigError(
+                f"learner rls: forgetting is {forgetting:g}; allowed is 0.9 to 1", key=("forgetting",)
+            )
         if not 1e-3 <= trust <= 1e9:
-            raise ConfigError(f"learner rls: trust is {trust:g}; allowed is 1e-3 to 1e9")
+            raise ConfigError(f"learner rls: trust is {trust:g}; allowed is 1e-3 to 1e9", key=("trust",))
         self.forgetting = float(forgetting)
         self.trust = float(trust)
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from rtcomp.errors import ConfigError
-from rtcomp.hysteresis.basis import Basis, register_basis
+from rtcomp.hysteresis.basis import Basis, checked_keys, register_basis
 from rtcomp.kernels import Floats, basis_kernel
 
 STARTED, PLAY = 0, 1
@@ -45,10 +45,12 @@ def checked_reaches(reaches: Sequence[float] | Floats, owner: str) -> Floats:
     """Return the reaches (m) as an array, or raise ConfigError for none or one that is not above 0."""
     values = np.array(reaches, dtype=np.float64).reshape(-1)
     if values.size == 0:
-        raise ConfigError(f"{owner} model: reaches are empty; give at least one (m)")
+        raise ConfigError(f"{owner} model: reaches are empty; give at least one (m)", key=("reaches",))
     for i, reach in enumerate(values):
         if not (np.isfinite(reach) and reach > 0):
-            raise ConfigError(f"{owner} model: reaches[{i}] is {reach:g} m; a reach must be above 0")
+            raise ConfigError(
+                f"{owner} model: reaches[{i}] is {reach:g} m; a reach must be above 0", key=("reaches", i)
+            )
     return values
 
 
@@ -99,6 +101,5 @@ class StopBasis(Basis):
     @classmethod
     def from_dict(cls, entry: Mapping[str, Any]) -> StopBasis:
         """Build from ``{reaches: [...]}``."""
-        if set(entry) != {"reaches"}:
-            raise ConfigError(f"stop model takes 'reaches'; found {sorted(entry)}")
+        checked_keys(entry, cls.name, ["reaches"])
         return cls(entry["reaches"])

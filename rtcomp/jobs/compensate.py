@@ -11,7 +11,7 @@ import numpy as np
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.identify import ALWAYS, follow, model_of
-from rtcomp.jobs.session import Run, Watch
+from rtcomp.jobs.session import Run, Watch, check
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,7 @@ def compensate(
 
     With `out`, recordings are written there (without.h5, with.h5).
     """
+    check(config, "compensate")
     section = config.run.compensate
     learn = ALWAYS if section.learn else None
     without = follow(config, "compensate", model=model, path=_in(out, "without.h5"), watch=watch)

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rtcomp.errors import ConfigError
+from rtcomp.errors import ConfigError, Interrupted
 from rtcomp.jobs.compensate import Compensated, compensate, live
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.identify import Identified, identify
-from rtcomp.jobs.session import Run, Watch
+from rtcomp.jobs.session import Run, Watch, check
 
 SWITCH_AT, FADE = 6.0, 0.5
 """s: when the live run begins to feed forward, and how long that takes to its full share."""
@@ -31,9 +31,12 @@ class Demonstrated:
 
 def demo(config: Configuration, *, out: Path | None = None, watch: Watch | None = None) -> Demonstrated:
     """Run the demonstration; with `out`, every run is recorded there."""
+    check(config, "", "judge", "compensate")
     path = None if out is None else out / "live.h5"
     first = live(config, SWITCH_AT, FADE, path=path, watch=watch)
     identified = identify(config, out=out, watch=watch)
+    if identified.signal is not None:
+        raise Interrupted(identified.signal, "stopped before compensating")
     return Demonstrated(first, identified, compensate(config, identified.model, out=out, watch=watch))
 
 

@@ -15,7 +15,7 @@ from rtcomp.hysteresis.prior import non_increasing
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.judge import Friction, Judgement, friction_of, judge, learning_curve, reached
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
-from rtcomp.jobs.session import Run, Watch, make_device, make_tick, run_loop
+from rtcomp.jobs.session import Run, Watch, check, make_device, make_tick, run_loop
 from rtcomp.kernels import Floats
 from rtcomp.loop.tick import Tick
 from rtcomp.recording.reader import Recording
@@ -39,6 +39,8 @@ class Identified:
     curve: Floats
     """Relative error of those weights, frozen, on the held-out motion (else in-sample), (M,)."""
     notes: list[str] = field(default_factory=list)
+    signal: int | None = None
+    """The signal that ended it early; None where it ran to its end."""
 
     def summary(self) -> dict[str, Any]:
         """Return the figures, for `--json` and the result file."""
@@ -56,7 +58,7 @@ class Identified:
             "ticks": outcome.ticks,
             "ticks_late": outcome.late,
             "slots_lost": outcome.lost,
-            "stopped_by": outcome.stopped_by,
+            "stopped_by": outcome.stopped_by if self.signal is None else "signal",
             "notes": self.notes,
         }
 
@@ -80,20 +82,32 @@ def identify(
     """
     if recording is not None:
         return _from_recording(config, recording, out, watch)
-    learned = follow(config, "", learn=learning_window(config), path=_in(out, "recording.h5"), watch=watch)
+    check(config, "", *(["judge"] if config.run.judge.reference is not None else []))
+    learned = follow(
+        config, "", learn=learning_window(config), path=_in(out, "recording.h5"), watch=watch, partial=True
+    )
     model = model_of(config, learned.tick, learned_positions(config, learned))
     own = friction(config, learned)
-    in_sample = judge(model, own, settle=config.run.judge.settle)
-    judged, held_out, on = None, None, own
+    settle = config.run.judge.settle
+    # A run stopped early is judged all the same: on its second half at least.
+    settle = min(settle, 0.5 * float(learned.columns["time"][-1]))
+    in_sample = judge(model, own, settle=settle)
+    judged: Run | None = None
+    held_out, on = None, own
     if config.run.judge.reference is not None and learned.outcome.stopped_by == "end":
-        judged = follow(config, "judge", path=_in(out, "judge.h5"), watch=watch)
+        judged = follow(config, "judge", path=_in(out, "judge.h5"), watch=watch, partial=True)
+    last = judged or learned
+    number = last.signal if last.outcome.stopped_by == "signal" else None
+    if judged is not None and number is None:
         on = friction(config, judged)
-        held_out = judge(model, on, settle=config.run.judge.settle)
-    curve = learning_curve(
-        model.basis, learned.weights, learned.tick.offset_scale, on, settle=config.run.judge.settle
-    )
+        held_out = judge(model, on, settle=settle)
+    curve = learning_curve(model.basis, learned.weights, learned.tick.offset_scale, on, settle=settle)
     notes = never_reached(model)
-    return Identified(config, model, learned, in_sample, held_out, learned.weights_time, curve, notes)
+    if number is not None:
+        what = "judging" if judged is not None else "learning"
+        at = last.outcome.ticks * config.period
+        notes.append(f"a signal ended {what} after {at:.4g} s; the model was not judged on other motion")
+    return Identified(config, model, learned, in_sample, held_out, learned.weights_time, curve, notes, number)
 
 
 def follow(
@@ -106,8 +120,12 @@ def follow(
     feedforward_fade: float = 0.0,
     path: Path | None = None,
     watch: Watch | None = None,
+    partial: bool = False,
 ) -> Run:
-    """Run the loop along the reference of `section` to its end, with or without learning and feedforward."""
+    """Run the loop along the reference of `section` to its end, with or without learning and feedforward.
+
+    `partial` as `run_loop` takes it.
+    """
     reference = config.reference(section)
     device = make_device(config)
     plan = ReferencePlan(
@@ -121,7 +139,7 @@ def follow(
         feedforward_fade,
     )
     tick = make_tick(config, device.delay_ticks, model)
-    return run_loop(config, plan, device, tick, path=path, watch=watch)
+    return run_loop(config, plan, device, tick, path=path, watch=watch, partial=partial)
 
 
 def learning_window(config: Configuration) -> tuple[float, float]:
@@ -178,6 +196,12 @@ def _from_recording(
     config = config.changed(rate=recording.rate_hz)
     position = bridged(recording)
     time = recording.time - recording.time[0]
+    for key, given in (("identify.learn", config.identify.learn), ("judge.window", config.run.judge.window)):
+        if given is not None and not np.any((time >= given[0]) & (time <= given[1])):
+            raise RecordingError(
+                f"{recording.path}: no row lies in {key}, {given[0]:g} to {given[1]:g} s; the recording "
+                f"takes {time[-1]:g} s"
+            )
     slow = zero_phase(position, bandwidth(recording.rate_hz), recording.rate_hz)
     speed = np.gradient(slow, config.period)
     known = known_force(config.stage, time, slow, speed, viscous=False)
@@ -207,10 +231,6 @@ def _from_recording(
     settle = config.run.judge.settle
     first = config.identify.learn[0] if config.identify.learn is not None else 0.0
     last = min(learn_end, float(time[-1]))
-    if window is not None and window[0] >= time[-1]:
-        raise RecordingError(
-            f"{recording.path}: judge.window begins at {window[0]:g} s; the recording ends at {time[-1]:g} s"
-        )
     in_sample = judge(model, own, (first, last), settle)
     held_out = judge(model, own, (window[0], window[1]), 0.0) if window is not None else None
     curve = learning_curve(

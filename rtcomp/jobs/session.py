@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
+from signal import SIGINT
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,7 +20,7 @@ from rtcomp_drivers.registry import create
 from rtcomp import __version__
 from rtcomp.control.limits import limit_state, limit_vector
 from rtcomp.control.pid import pid_state, pid_vector
-from rtcomp.errors import ConfigError
+from rtcomp.errors import ConfigError, Interrupted
 from rtcomp.hysteresis.conditioning import low_pass
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.lms import Lms
@@ -38,6 +39,8 @@ from rtcomp.recording.recorder import Recorder, RecorderSummary
 
 RING_SECONDS = 8.0
 """How long the recorder may be held up before rows are lost."""
+LEAST_TICKS = 64
+"""Rows from which an interrupted run can be judged."""
 WEIGHTS_EVERY = 0.1
 """s between two stored sets of weights."""
 
@@ -68,6 +71,8 @@ class Run:
     realtime: Mapping[str, str]
     counters: Mapping[str, int] = field(default_factory=dict)
     recorder: RecorderSummary | None = None
+    signal: int = SIGINT
+    """The signal that stopped it, where ``outcome.stopped_by`` says that one did."""
 
     @property
     def doubtful(self) -> npt.NDArray[np.bool_]:
@@ -102,9 +107,29 @@ def make_device(
         start=start,
         substeps=substeps,
     )
-    settings = {"driver": "replay"} if recording is not None else config.run.device
+    settings: Mapping[str, Any] = {"driver": "replay"} if recording is not None else config.run.device
     given = recording is None and "device" in config.file.data
     return create(settings, bench, config.file if given else None)
+
+
+def _sections(config: Configuration) -> Floats:
+    smoothing = config.run.identify.smoothing if config.run.identify is not None else 0.0
+    try:
+        return low_pass(smoothing, config.stage.rate)
+    except ConfigError as error:
+        says = str(error).removeprefix("identify: smoothing ")
+        raise config.file.error(("identify", "smoothing"), says) from error
+
+
+def check(config: Configuration, *sections: str) -> None:
+    """Raise what running the references of `sections` would raise before anything is opened or written.
+
+    ConfigError for the device's settings, the model or a controller that is missing, LimitError for a
+    reference that stage or limits do not allow.
+    """
+    for section in sections:
+        config.reference(section)
+    make_tick(config, make_device(config).delay_ticks)
 
 
 def make_tick(
@@ -126,7 +151,10 @@ def make_tick(
     offset = section.offset if section is not None else True
     controller = stage.controller
     if closed_loop and controller is None:
-        raise ConfigError(f"{config.path}: section controller is missing; a reference needs one")
+        raise ConfigError(
+            f"{config.path}: section controller is missing; following a reference needs one, say at least "
+            "controller.kp (V/m)"
+        )
     limits = config.run.limits
     voltage = config.voltage_limit if closed_loop else 1e9
     gains = (controller.kp, controller.ki, controller.kd) if controller is not None else (0.0, 0.0, 0.0)
@@ -145,7 +173,7 @@ def make_tick(
         ),
         basis,
         learner,
-        sections=low_pass(section.smoothing if section is not None else 0.0, stage.rate),
+        sections=_sections(config),
         pid=(pid_vector(*gains, period=config.period, voltage_limit=voltage), pid_state()),
         limits=(limit_vector(voltage, config.period, limits.slew or np.inf), limit_state()),
         learn_offset=offset,
@@ -165,10 +193,12 @@ def run_loop(
     path: Path | None = None,
     watch: Watch | None = None,
     metadata: Mapping[str, Any] | None = None,
+    partial: bool = False,
 ) -> Run:
     """Run the loop once; record to `path` (HDF5) where one is given, in memory where not.
 
-    Raises what the loop raises (DeviceError, LimitError); the recording up to there is kept.
+    Raises what the loop raises (DeviceError, LimitError), and Interrupted where a signal has ended the run
+    (with `partial` only where it did so in the first moments); the recording up to there is kept.
     """
     wall = config.wall_clock and tick.closed_loop
     columns = tuple(COLUMNS)
@@ -181,13 +211,16 @@ def run_loop(
             if path is not None:
                 about = describe(config, tick, metadata)
                 recorder = Recorder.start(
-                    path, ring, columns, about, weights_columns=tick.weights.size, axis=config.stage.axis
-                )
+                    path, ring, columns, about, weights_columns=tick.weights.size, axis=config.stage.axis,
+                    later=tuple(in_loop),
+                )  # fmt: skip
             stop = stack.enter_context(stop_on_signals())
             if wall and watch is not None:
                 stack.enter_context(watch.attach(ring, columns, plan.ticks))
             if wall:
                 in_loop = stack.enter_context(realtime_process())
+            if recorder is not None:
+                recorder.fill(in_loop)
             outcome = run(
                 device,
                 tick,
@@ -205,6 +238,8 @@ def run_loop(
         if path is None:
             rows = ring.take()
         ring.release()
+    if outcome.stopped_by == "signal" and not (partial and outcome.ticks >= LEAST_TICKS):
+        raise Interrupted(stop.number, stopped(outcome.ticks * config.period, tick.closed_loop))
     counters = dict(getattr(device, "counters", {}))
     delay = device.delay_ticks
     if path is None:
@@ -213,10 +248,18 @@ def run_loop(
         history = rows[every - 1 :: every]
         return Run(
             recorded, history[:, 0].copy(), history[:, len(columns) :].copy(), outcome, tick, delay,
-            config.stage.rate, in_loop, counters,
+            config.stage.rate, in_loop, counters, signal=stop.number,
         )  # fmt: skip
     recorded, times, weights = read_back(path, columns)
-    return Run(recorded, times, weights, outcome, tick, delay, config.stage.rate, in_loop, counters, summary)
+    return Run(
+        recorded, times, weights, outcome, tick, delay, config.stage.rate, in_loop, counters, summary,
+        stop.number,
+    )  # fmt: skip
+
+
+def stopped(seconds: float, closed_loop: bool = True) -> str:
+    """Say for a person where a signal has stopped a run."""
+    return f"stopped after {seconds:.4g} s{' at zero volts' if closed_loop else ''}"
 
 
 def read_back(path: Path, columns: tuple[str, ...]) -> tuple[dict[str, Floats], Floats, Floats]:
@@ -224,8 +267,10 @@ def read_back(path: Path, columns: tuple[str, ...]) -> tuple[dict[str, Floats], 
     import h5py
 
     with h5py.File(path, "r") as file:
-        recorded = {name: file[name][:] for name in columns}
-        return recorded, file["weights/time"][:], file["weights/weights"][:]
+        rows = min(file[name].shape[0] for name in columns)  # a recorder that died may leave them uneven
+        recorded = {name: file[name][:rows] for name in columns}
+        sets = min(file["weights/time"].shape[0], file["weights/weights"].shape[0])
+        return recorded, file["weights/time"][:sets], file["weights/weights"][:sets]
 
 
 def describe(config: Configuration, tick: Tick, more: Mapping[str, Any] | None = None) -> dict[str, Any]:

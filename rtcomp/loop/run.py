@@ -58,6 +58,8 @@ class Stop:
 
     def __init__(self) -> None:
         self.requested = False
+        self.number: int = signal.SIGINT
+        """The signal that asked first."""
 
 
 @contextlib.contextmanager
@@ -68,8 +70,10 @@ def stop_on_signals() -> Iterator[Stop]:
     """
     stop = Stop()
 
-    def ask(_number: int, _frame: FrameType | None) -> None:
-        stop.requested = True
+    def ask(number: int, _frame: FrameType | None) -> None:
+        if not stop.requested:
+            stop.number = number
+            stop.requested = True
 
     before = {}
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Mapping
 from typing import Any, TypeVar
 
-from rtcomp.errors import ConfigError
+from rtcomp.errors import ConfigError, nearest
 from rtcomp.physics.effect import Effect
 
 E = TypeVar("E", bound=type[Effect])
@@ -24,9 +23,7 @@ def register(effect: E) -> E:
 def entry(name: str) -> type[Effect]:
     """Return the effect class of that name; raise ConfigError naming the nearest where there is none."""
     if name not in _ENTRIES:
-        near = difflib.get_close_matches(name, _ENTRIES, n=1, cutoff=0.5)
-        hint = f"; did you mean {near[0]!r}?" if near else f"; known are {', '.join(sorted(_ENTRIES))}"
-        raise ConfigError(f"no effect is named {name!r}{hint}")
+        raise ConfigError(f"no effect is named {name!r}; {nearest(name, _ENTRIES)}", key=("name",))
     return _ENTRIES[name]
 
 
@@ -35,7 +32,8 @@ def build(description: Mapping[str, Any]) -> Effect:
     rest = dict(description)
     name = rest.pop("name", None)
     if not isinstance(name, str):
-        raise ConfigError(f"an effect needs a name; found {dict(description)!r}")
+        found = f"it is {name!r}" if name is not None else f"found {', '.join(map(repr, rest)) or 'nothing'}"
+        raise ConfigError(f"an effect needs a name; {found}", key=("name",))
     return entry(name).from_dict(rest)
 
 

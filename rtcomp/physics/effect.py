@@ -34,7 +34,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rtcomp.errors import ConfigError
+from rtcomp.errors import ConfigError, nearest
 from rtcomp.kernels import Floats, Kernel
 
 
@@ -64,14 +64,17 @@ class Parameter:
     def check(self, value: Any, owner: str) -> float:
         """Return `value` as a float, or raise ConfigError naming the parameter, the value and the range."""
         if isinstance(value, bool) or not isinstance(value, numbers.Real):
-            raise ConfigError(f"{owner}: {self.name} is {value!r}; it must be a number ({self.unit})")
+            raise ConfigError(
+                f"{owner}: {self.name} is {value!r}; it must be a number ({self.unit})", key=(self.name,)
+            )
         number = float(value)
         inside = self.low < number <= self.high if self.open_low else self.low <= number <= self.high
         if not np.isfinite(number) or not inside:
             bracket = "(" if self.open_low else "["
             raise ConfigError(
                 f"{owner}: {self.name} is {number:g} {self.unit}; "
-                f"allowed is {bracket}{self.low:g}, {self.high:g}]"
+                f"allowed is {bracket}{self.low:g}, {self.high:g}]",
+                key=(self.name,),
             )
         return number
 
@@ -111,14 +114,21 @@ class Effect:
         for key in values:
             if key not in known:
                 raise ConfigError(
-                    f"{self.name}: unknown parameter {key!r}; it has {', '.join(sorted(known))}"
+                    f"{self.name}: unknown parameter {key!r}; {nearest(key, self._names())}", key=(key,)
                 )
         self.values: dict[str, float] = {}
         for parameter in self.parameters:
             value = values.get(parameter.name, parameter.default)
             if value is None:
-                raise ConfigError(f"{self.name}: parameter {parameter.name!r} ({parameter.unit}) is missing")
+                raise ConfigError(
+                    f"{self.name}: parameter {parameter.name!r} ({parameter.unit}) is missing",
+                    key=(parameter.name,),
+                )
             self.values[parameter.name] = parameter.check(value, self.name)
+
+    def _names(self) -> list[str]:
+        """Return the keys that an entry of this effect may have, without its name."""
+        return [p.name for p in self.parameters]
 
     def vector(self) -> Floats:
         """Return the parameters as the kernel's `p`."""

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rtcomp.errors import ConfigError
+from rtcomp.errors import ConfigError, nearest
 from rtcomp.kernels import Floats
 from rtcomp.physics.effect import Effect
 
@@ -29,9 +29,19 @@ class ListEffect(Effect):
         if self.list_needed and not elements:
             inside = ", ".join(q.name for q in self.element)
             raise ConfigError(
-                f"{self.name}: {self.list_owner} is empty; give at least one element {{{inside}}}"
+                f"{self.name}: {self.list_owner} is empty; give at least one element {{{inside}}}",
+                key=(self.list_name,),
             )
-        self.elements = [self._item(i, item) for i, item in enumerate(elements)]
+        self.elements = [self._located_item(i, item) for i, item in enumerate(elements)]
+
+    def _names(self) -> list[str]:
+        return [*super()._names(), self.list_name]
+
+    def _located_item(self, index: int, item: Any) -> tuple[float, ...]:
+        try:
+            return self._item(index, item)
+        except ConfigError as error:
+            raise error.inside(self.list_name, index) from None
 
     def _item(self, index: int, item: Any) -> tuple[float, ...]:
         owner = f"{self.list_owner}[{index}]"
@@ -39,7 +49,9 @@ class ListEffect(Effect):
         if isinstance(item, Mapping):
             for key in item:
                 if key not in names:
-                    raise ConfigError(f"{owner}: unknown parameter {key!r}; it has {', '.join(names)}")
+                    raise ConfigError(
+                        f"{owner}: unknown parameter {key!r}; {nearest(key, names)}", key=(key,)
+                    )
             found = {**{q.name: q.default for q in self.element}, **item}
         elif isinstance(item, Sequence) and not isinstance(item, str) and len(item) == len(names):
             found = dict(zip(names, item, strict=True))
@@ -47,7 +59,7 @@ class ListEffect(Effect):
             raise ConfigError(f"{owner} is {item!r}; it must be {{{', '.join(names)}}}")
         for q in self.element:
             if found.get(q.name) is None:
-                raise ConfigError(f"{owner}: parameter {q.name!r} ({q.unit}) is missing")
+                raise ConfigError(f"{owner}: parameter {q.name!r} ({q.unit}) is missing", key=(q.name,))
         return tuple(q.check(found[q.name], owner) for q in self.element)
 
     def vector(self) -> Floats:
@@ -65,9 +77,13 @@ class ListEffect(Effect):
         rest = dict(entry)
         items = rest.pop(cls.list_name, ())
         if not isinstance(items, Sequence) or isinstance(items, str):
-            raise ConfigError(f"{cls.name}: {cls.list_name} is {items!r}; it must be a list")
+            raise ConfigError(
+                f"{cls.name}: {cls.list_name} is {items!r}; it must be a list", key=(cls.list_name,)
+            )
         if "elements" in rest:
-            raise ConfigError(f"{cls.name}: unknown parameter 'elements'; its list is {cls.list_name!r}")
+            raise ConfigError(
+                f"{cls.name}: unknown parameter 'elements'; its list is {cls.list_name!r}", key=("elements",)
+            )
         return cls(items, **rest)
 
     def __repr__(self) -> str:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, field_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator
 
 from rtcomp import physics
-from rtcomp.errors import ConfigError
+from rtcomp.errors import ConfigError, nearest
 from rtcomp.stage.identified import is_identified, stop_bank
 from rtcomp.yamlfile import Section
 
@@ -32,6 +32,15 @@ Friction = Annotated[
 or an identified hysteresis model."""
 
 
+def _effect_exists(entry: dict[str, Any]) -> dict[str, Any]:
+    physics.build(entry)
+    return entry
+
+
+EffectEntry = Annotated[dict[str, Any], AfterValidator(_effect_exists)]
+"""One item of ``effects``: ``{name: ..., parameter: value, ...}``."""
+
+
 class Mechanics(Section):
     """The section ``stage``."""
 
@@ -43,20 +52,13 @@ class Mechanics(Section):
     micro_damping: float = Field(0.0, ge=0, le=1e8, description="N s/m, damping of presliding at rest")
     micro_damping_speed: float = Field(5e-3, gt=0, le=1e3, description="m/s, where it has fallen to 1/e")
     friction: Friction | None = None
-    effects: list[dict[str, Any]] = Field(default_factory=list, description="what else is known to be there")
+    effects: list[EffectEntry] = Field(default_factory=list, description="what else is known to be there")
 
     @field_validator("friction")
     @classmethod
     def _friction_exists(cls, value: Any) -> Any:
         if isinstance(value, dict):
             friction_model(value)
-        return value
-
-    @field_validator("effects")
-    @classmethod
-    def _effects_exist(cls, value: list[dict[str, Any]]) -> list[dict[str, Any]]:
-        for effect in value:
-            physics.build(effect)
         return value
 
 
@@ -76,7 +78,7 @@ class Controller(Section):
 
 
 RUN_SECTIONS = (
-    "reference", "clock", "device", "limits", "identify", "judge", "compensate", "recording", "seed",
+    "reference", "clock", "device", "limits", "identify", "judge", "relax", "compensate", "recording", "seed",
 )  # fmt: skip
 """What a run configuration holds beside its stage; reading it as a stage leaves these out."""
 
@@ -92,11 +94,17 @@ class StageFile(Section):
 
 def friction_model(entry: dict[str, Any]) -> physics.Effect:
     """Build the friction effect from ``{model: NAME, ...}``; raise ConfigError where it cannot be."""
-    rest = dict(entry)
-    name = rest.pop("model", None)
+    name = entry.get("model")
     if is_identified(name):
         return stop_bank(entry)
-    effect = physics.build({"name": name, **rest})
-    if effect.place is not physics.Place.FRICTION:
-        raise ConfigError(f"friction: {name!r} is not a friction model; it belongs under effects")
-    return effect
+    models = [e.name for e in physics.entries() if e.place is physics.Place.FRICTION] + ["interval"]
+    if name is None:
+        hint = f"known are {', '.join(models)}; or give a list of stop elements"
+        raise ConfigError(f"friction: model is missing; {hint}", key=("model",))
+    if name not in models:
+        if any(name == e.name for e in physics.entries()):
+            says = f"friction: {name!r} is not a friction model; it belongs under effects"
+        else:
+            says = f"friction: no model is named {name!r}; {nearest(name, models)}"
+        raise ConfigError(says, key=("model",))
+    return physics.build({"name": name, **{k: v for k, v in entry.items() if k != "model"}})

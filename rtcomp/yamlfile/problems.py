@@ -9,6 +9,7 @@ from typing import Any
 
 import pydantic
 
+from rtcomp.errors import ConfigError
 from rtcomp.yamlfile.keys import about, allowed_range, field_at, nearest_choice, nearest_key
 from rtcomp.yamlfile.load import KeyPath, dotted, has, one_line
 
@@ -166,8 +167,11 @@ def _translate(group: list[_Placed], model: type[pydantic.BaseModel], section: K
         count = context.get("actual_length")
         return _problem(key, f"has {count} entries; it must have {bound}", f"has {count} entries")
     if kind in ("value_error", "assertion_error"):
-        message = one_line(str(context.get("error", detail["msg"])))
+        cause = context.get("error")
+        message = one_line(str(cause if cause is not None else detail["msg"]))
         message = message.removeprefix(f"{key[-1]}: ") if key else message
+        if isinstance(cause, ConfigError):
+            key = (*key, *cause.key)
         return Problem(key, f"{dotted(key)}: {message}" if key else message, dotted(key) or message)
     message = one_line(str(detail["msg"]))
     return _problem(key, f"is {value}; {message[:1].lower()}{message[1:]}", f"is {value}")
