@@ -10,7 +10,6 @@ import numpy.typing as npt
 from rtcomp.kernels import Floats, call_effect, compiled
 from rtcomp.physics.effect import Effect
 from rtcomp.physics.wires import (
-    ACCELERATION,
     COUNT,
     GAIN,
     MASS,
@@ -67,8 +66,8 @@ def new_rows(count: int) -> Floats:
 def motion_rows(position: Floats, step: float, volts: Floats | float = 0.0) -> Floats:
     """Return rows that follow `position` (m, shape (n,)) from 0, one every `step` seconds, at `volts`.
 
-    Speed is the mean over each step, which is what the displacement says; the mass is 1 kg, the force
-    constant 1 N/V.
+    Each step is made at constant speed, its displacement over its length, without acceleration; the mass is
+    1 kg, the force constant 1 N/V.
     """
     rows = new_rows(len(position))
     rows[:, TIME] = step * np.arange(1, len(position) + 1)
@@ -76,6 +75,5 @@ def motion_rows(position: Floats, step: float, volts: Floats | float = 0.0) -> F
     rows[:, POSITION] = rows[:, SENSED] = position
     rows[:, MOVED] = np.diff(position, prepend=0.0)
     rows[:, VELOCITY] = rows[:, MOVED] / step
-    rows[:, ACCELERATION] = np.diff(rows[:, VELOCITY], prepend=0.0) / step
     rows[:, VOLTS] = volts
     return rows

@@ -112,7 +112,7 @@ def test_initial_slope_is_the_stiffness_whatever_the_reach(name):
 @every
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_fall_of_the_level_is_followed_also_out_of_a_minor_loop(name, sign):
-    """The level halves on the way back up inside a minor loop, as a Stribeck effect in front would make it."""
+    """The level halves on the way back up inside a minor loop, as a Stribeck effect would make it."""
     back = [99.5e-6, 99.9e-6]
     x = np.concatenate([1e-6 * np.arange(1, 101), back, back[-1] + 1e-6 * np.arange(1, 501)])
     rows = motion_rows(sign * x, 1e-3)
