@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
+from rtcomp_drivers.registry import find, names
 
-from rtcomp.control.reference_settings import ReferenceSettings
+from rtcomp.control.reference_settings import ReferenceSettings, reference_settings
 from rtcomp.control.references import Reference, build_reference, check
 from rtcomp.errors import ConfigError, LimitError
 from rtcomp.hysteresis import Basis, Learner, basis_named, build_learner
@@ -20,6 +21,7 @@ from rtcomp.yamlfile import Section, YamlFile, load_yaml, validate
 
 Positive = Annotated[float, Field(gt=0)]
 Window = Annotated[list[float], Field(min_length=2, max_length=2)]
+Times = Annotated[list[Annotated[float, Field(ge=0)]], Field(min_length=2, max_length=2)]
 
 
 class Limits(Section):
@@ -35,7 +37,7 @@ class Limits(Section):
     @classmethod
     def _ordered(cls, value: list[float] | None) -> list[float] | None:
         if value is not None and not value[0] < value[1]:
-            raise ValueError(f"travel is [{value[0]:g}, {value[1]:g}]; the lowest must come first")
+            raise ValueError(f"is [{value[0]:g}, {value[1]:g}]; the lowest must come first")
         return value
 
 
@@ -46,7 +48,9 @@ class Identify(Section):
     intervals: int = Field(20, ge=1, le=100_000, description="number of elements")
     range: Positive | None = Field(None, description="m, from full saturation to full saturation")
     spacing: float = Field(1.0, ge=1e-3, le=1e3, description="last width over first")
-    widths: list[float] | None = Field(None, description="m, each interval, instead of the three above")
+    widths: Annotated[list[Positive], Field(min_length=1)] | None = Field(
+        None, description="m, each interval, instead of the three above"
+    )
     learner: dict[str, Any] = Field(
         default_factory=lambda: {"learner": "rls", "forgetting": 0.9995},
         description="learner and its settings",
@@ -55,7 +59,7 @@ class Identify(Section):
     gate: float = Field(0.0, ge=0, description="m of motion between two updates")
     offset: bool = Field(True, description="learn a constant force too")
     prior: Literal["none", "non-increasing"] = Field("none", description="what is known of the virgin curve")
-    learn: Window | None = Field(None, description="s, when to learn; all of the run if not given")
+    learn: Times | None = Field(None, description="s, when to learn; all of the run if not given")
 
     @field_validator("model")
     @classmethod
@@ -69,32 +73,39 @@ class Identify(Section):
         build_learner(value)
         return value
 
-    @field_validator("widths")
-    @classmethod
-    def _usable_widths(cls, value: list[float] | None) -> list[float] | None:
-        if value is not None:
-            IntervalBasis(value)
-        return value
-
     @model_validator(mode="after")
     def _one_way_to_say_where(self) -> Identify:
         if self.widths is None and self.range is None:
             raise ValueError("give range (m, from full saturation to full saturation) or widths")
         if self.widths is not None and self.range is not None:
-            raise ValueError("range and widths are both given; the widths alone say where the intervals lie")
-        if self.prior != "none" and self.model != "interval":
-            raise ValueError(f"prior {self.prior!r} speaks of the interval model; model is {self.model!r}")
-        if self.learn is not None and not self.learn[0] < self.learn[1]:
-            raise ValueError(f"learn is [{self.learn[0]:g}, {self.learn[1]:g}] s; the start must come first")
+            says = "range and widths are both given; the widths alone say where the intervals lie"
+            raise ConfigError(says, key=("range",))
+        for key, given in (("prior", self.prior != "none"), ("widths", self.widths is not None)):
+            if given and self.model != "interval":
+                raise ConfigError(f"speaks of the interval model; model is {self.model!r}", key=(key,))
+        if self.learn is not None:
+            _in_order(self.learn, ("learn",))
         return self
+
+
+def _in_order(window: list[float], key: tuple[str, ...] = ()) -> None:
+    if not window[0] < window[1]:
+        raise ConfigError(f"is [{window[0]:g}, {window[1]:g}] s; the start must come first", key=key)
 
 
 class Judge(Section):
     """The section ``judge``: the motion that frozen weights are judged on."""
 
     reference: ReferenceSettings | None = Field(None, description="another motion of the stage")
-    window: Window | None = Field(None, description="s of a recording")
+    window: Times | None = Field(None, description="s of a recording")
     settle: float = Field(0.0, ge=0, description="s left out while the model's memory fills")
+
+    @field_validator("window")
+    @classmethod
+    def _ordered(cls, value: list[float] | None) -> list[float] | None:
+        if value is not None:
+            _in_order(value)
+        return value
 
 
 class Compensate(Section):
@@ -103,6 +114,19 @@ class Compensate(Section):
     reference: ReferenceSettings | None = Field(None, description="motion to compare on; else the first one")
     settle: float = Field(1.0, ge=0, description="s at the start that the comparison leaves out")
     learn: bool = Field(False, description="go on learning while compensating")
+
+
+class Relax(Section):
+    """The section ``relax``: decaying reversals before each run on a real device, about where it stands.
+
+    Friction remembers what the stage did before; models and compensators start from the virgin state. A
+    motion that dies out slowly brings every contact back to it, as the paper does with magnetism.
+    """
+
+    amplitude: Positive = Field(description="m, of the first reversal; as far as friction remembers")
+    ratio: float = Field(0.8, gt=0.2, lt=0.99, description="from one reversal to the next")
+    count: int = Field(24, ge=4, le=1000, description="of reversals")
+    stroke_time: Positive = Field(0.15, description="s from reversal to reversal")
 
 
 class RecordingSection(Section):
@@ -122,6 +146,7 @@ class RunFile(StageFile):
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
     identify: Identify | None = None
     judge: Judge = Field(default_factory=lambda: Judge.model_validate({}))
+    relax: Relax | None = None
     compensate: Compensate = Field(default_factory=lambda: Compensate.model_validate({}))
     recording: RecordingSection = Field(default_factory=lambda: RecordingSection.model_validate({}))
     seed: int = Field(0, ge=0, description="of the simulated noise")
@@ -144,6 +169,9 @@ class Configuration:
     def of(cls, file: YamlFile) -> Configuration:
         """Check a configuration that has been read, or made."""
         run = validate(RunFile, file)
+        driver = run.device.get("driver")
+        if "device" in file.data and driver in names():  # another machine's driver matters only where used
+            validate(find(driver).Settings, file, ("device",))
         stage_keys = set(StageFile.model_fields)
         stage = Stage(StageFile.model_validate(run.model_dump(include=stage_keys, exclude_unset=True)))
         limit = run.limits.voltage
@@ -174,10 +202,26 @@ class Configuration:
         """Whether deadlines are real: unless told otherwise, on everything but simulation and replay."""
         if self.run.clock is not None:
             return self.run.clock == "wall"
+        return self.real_device
+
+    @property
+    def real_device(self) -> bool:
+        """Whether the stage stands somewhere, with a past: on everything but simulation and replay."""
         return self.run.device.get("driver") not in ("simulated", "replay")
 
-    def reference(self, section: str = "") -> Reference:
-        """Return the reference of `section` (``judge``, ``compensate``), else the main one, checked."""
+    def relaxing(self, start: float) -> Reference | None:
+        """Return the decaying reversals about `start` (m) of the section ``relax``, checked, if any."""
+        relax = self.run.relax
+        if relax is None:
+            return None
+        entry = {"kind": "nested-reversals", **relax.model_dump(), "offset": start, "start": start}
+        return self._checked(build_reference(reference_settings(entry)), "relax")
+
+    def reference(self, section: str = "", start: float | None = None) -> Reference:
+        """Return the reference of `section` (``judge``, ``compensate``), else the main one, checked.
+
+        It begins where the configuration says, or at `start` (m), where the stage was found.
+        """
         settings, key = None, "reference"
         if section:
             settings = getattr(self.run, section).reference
@@ -185,7 +229,11 @@ class Configuration:
         settings = settings or self.run.reference
         if settings is None:
             raise ConfigError(f"{self.path}: section reference is missing; say how the stage shall move")
-        reference = build_reference(settings, folder=self.path.parent)
+        reference = self._checked(build_reference(settings, start=start, folder=self.path.parent), key)
+        self._check_times(section or "judge", reference.duration)
+        return reference
+
+    def _checked(self, reference: Reference, key: str) -> Reference:
         try:
             self._check(reference)
         except LimitError as error:
@@ -193,14 +241,28 @@ class Configuration:
             raise LimitError(f"{self.path}:{line}: {key}: {error}") from error
         return reference
 
+    def _check_times(self, section: str, duration: float) -> None:
+        """Raise ConfigError where nothing of a run so long (s) would be learned from, or judged."""
+        settle = getattr(self.run, section).settle
+        if settle >= duration:
+            raise self.file.error(
+                (section, "settle"), f"is {settle:g} s, but the reference ends at {duration:g} s"
+            )
+        learn = self.run.identify.learn if self.run.identify is not None else None
+        if learn is not None and section == "judge" and learn[0] >= duration:
+            raise self.file.error(
+                ("identify", "learn"), f"begins at {learn[0]:g} s, but the reference ends at {duration:g} s"
+            )
+
     def _check(self, reference: Reference) -> None:
         limits, stage = self.run.limits, self.stage
-        strongest = self.voltage_limit * stage.force_constant / stage.mass
+        force = self.voltage_limit * stage.force_constant
+        viscous = stage.mechanics.viscous
         check(
             reference,
             stroke=None if limits.travel is None else (limits.travel[0], limits.travel[1]),
-            speed=limits.speed,
-            acceleration=min(limits.acceleration or math.inf, strongest),
+            speed=min(limits.speed or math.inf, force / viscous if viscous else math.inf),
+            acceleration=min(limits.acceleration or math.inf, force / stage.mass),
         )
 
     def basis(self) -> Basis:
@@ -209,7 +271,10 @@ class Configuration:
         if section.widths is not None:
             return IntervalBasis(section.widths)
         assert section.range is not None
-        return basis_named(section.model).over(section.intervals, section.range, section.spacing)
+        try:
+            return basis_named(section.model).over(section.intervals, section.range, section.spacing)
+        except ConfigError as error:
+            raise self.file.error(("identify", *error.key), str(error)) from error
 
     def learner(self) -> Learner:
         """Return the learner that ``identify`` asks for."""

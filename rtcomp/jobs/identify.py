@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rtcomp.control.references import Reference
 from rtcomp.errors import RecordingError
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.model import HysteresisModel
@@ -17,6 +18,7 @@ from rtcomp.jobs.judge import Friction, Judgement, friction_of, judge, learning_
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
 from rtcomp.jobs.session import Run, Watch, check, make_device, make_tick, run_loop
 from rtcomp.kernels import Floats
+from rtcomp.loop.device import Device
 from rtcomp.loop.tick import Tick
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.balance import bandwidth, known_force, zero_phase
@@ -124,22 +126,39 @@ def follow(
 ) -> Run:
     """Run the loop along the reference of `section` to its end, with or without learning and feedforward.
 
-    `partial` as `run_loop` takes it.
+    A real device is relaxed first, and followed from where it stands. `partial` as `run_loop` takes it.
     """
-    reference = config.reference(section)
     device = make_device(config)
-    plan = ReferencePlan(
-        reference,
-        config.stage,
-        config.period,
-        max(16, round(reference.duration * config.stage.rate)),
-        device.delay_ticks,
-        learn,
-        feedforward_from,
-        feedforward_fade,
+    start = None
+    if config.real_device:
+        start = where_it_stands(device)
+        relaxing = config.relaxing(start)
+        if relaxing is not None:
+            config.reference(section, start)  # refuse what cannot be followed before anything moves
+            run_loop(config, _plan(config, relaxing, device), device, make_tick(config, device.delay_ticks))
+            start = where_it_stands(device)
+    plan = replace(
+        _plan(config, config.reference(section, start), device),
+        learn=learn,
+        feedforward_from=feedforward_from,
+        feedforward_fade=feedforward_fade,
     )
     tick = make_tick(config, device.delay_ticks, model)
     return run_loop(config, plan, device, tick, path=path, watch=watch, partial=partial)
+
+
+def _plan(config: Configuration, reference: Reference, device: Device) -> ReferencePlan:
+    ticks = max(16, round(reference.duration * config.stage.rate))
+    return ReferencePlan(reference, config.stage, config.period, ticks, device.delay_ticks)
+
+
+def where_it_stands(device: Device) -> float:
+    """Open the device, ask for its position (m) at zero volts, close it. Raises DeviceError."""
+    device.open()
+    try:
+        return device.exchange(0.0).position
+    finally:
+        device.close()
 
 
 def learning_window(config: Configuration) -> tuple[float, float]:
