@@ -15,6 +15,8 @@ from rtcomp.kernels import Floats
 from rtcomp.yamlfile import dump_yaml, load_yaml
 
 VERSION = 1
+_NUMBERS = ("offset", "travel", "reach", "divisions")
+_LISTS = ("weights", "reached", "widths", "reaches")
 _COMMENTS = {"widths": "m, of each interval", "weights": "N/m, of each regressor", "offset": "N"}
 
 
@@ -87,7 +89,8 @@ class HysteresisModel:
             wrong = "is missing" if name is None else f"is {name!r}"
             raise ConfigError(f"hysteresis model: model {wrong}; {nearest(name, bases())}", key=("model",))
         for key, value in (*rest.items(), ("weights", weights), ("offset", offset), ("reached", reached)):
-            _check_numbers(key, value)
+            if key in _NUMBERS or key in _LISTS:  # what is left is unknown: the basis says so
+                _check_numbers(key, value)
         basis = basis_named(name).from_dict(rest)  # says of a misspelt key which was meant
         if weights is None:
             raise ConfigError("hysteresis model: key 'weights' is missing", key=("weights",))
@@ -110,12 +113,11 @@ class HysteresisModel:
 
 def _check_numbers(key: str, value: Any) -> None:
     """Raise ConfigError where `value`, of a model file, is neither a number nor a list of numbers."""
-    single = key in ("offset", "travel", "reach", "divisions")
-    wanted = "a number" if single else "a list of numbers"
+    single = key in _NUMBERS
     if value is None and key in ("weights", "reached"):
         return
     if not single and not isinstance(value, list | tuple | np.ndarray):
-        raise ConfigError(f"hysteresis model: {key} is {value!r}; it must be {wanted}", key=(key,))
+        raise ConfigError(f"hysteresis model: {key} is {value!r}; it must be a list of numbers", key=(key,))
     for i, item in enumerate([value] if single else value):
         if isinstance(item, bool) or not isinstance(item, int | float | np.number):
             where = (key,) if single else (key, i)

@@ -12,7 +12,7 @@ from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Parameter, Place
-from rtcomp.physics.level import LEVEL, VISCOUS, stribeck_level
+from rtcomp.physics.level import LEVEL, VISCOUS, speed_midway, stribeck_level
 from rtcomp.physics.lists import ListEffect
 from rtcomp.physics.wires import FRICTION, MOVED, REACH, SCALE, STEP, VELOCITY
 
@@ -31,7 +31,7 @@ def gms(p: Floats, s: Floats, w: Floats) -> None:
         for i in range(count):
             force += s[i]
     else:
-        level = stribeck_level(p[0], p[1], p[2], p[3], w[VELOCITY]) * w[REACH]
+        level = stribeck_level(p[0], p[1], p[2], p[3], speed_midway(w)) * w[REACH]
         direction = math.copysign(1.0, moved)
         relax = p[4] * w[STEP] / level
         for i in range(count):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
-from rtcomp.kernels import compiled
+from rtcomp.kernels import Floats, compiled
 from rtcomp.physics.effect import Parameter
+from rtcomp.physics.wires import ACCELERATION, STEP, VELOCITY
 
 COULOMB = Parameter("coulomb", "N", 0.0, 1e6, "friction of fast sliding, without viscous part", open_low=True)
 STATIC = Parameter("static", "N", 0.0, 1e6, "friction at the limit of low speed", open_low=True)
@@ -26,3 +27,13 @@ def stribeck_level(coulomb: float, static: float, velocity: float, exponent: flo
     ratio = abs(v) / velocity
     power = ratio * ratio if exponent == 2.0 else ratio**exponent
     return coulomb + (static - coulomb) * math.exp(-power)
+
+
+@compiled
+def speed_midway(w: Floats) -> float:
+    """Return the velocity (m/s) in the middle of the step that the wires are at the end of.
+
+    A step's displacement is made under the level of its middle: with that of its end, friction would run
+    ahead of the motion by half a step, first-order in it, and stick-slip lives on the difference.
+    """
+    return float(w[VELOCITY] - 0.5 * w[STEP] * w[ACCELERATION])

@@ -13,7 +13,7 @@ from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.approach import SHARPNESS, STEPS, advance, flow, longest
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Parameter, Place
-from rtcomp.physics.level import LEVEL, VISCOUS, stribeck_level
+from rtcomp.physics.level import LEVEL, VISCOUS, speed_midway, stribeck_level
 from rtcomp.physics.lists import ListEffect
 from rtcomp.physics.wires import FRICTION, MOVED, REACH, SCALE, VELOCITY
 
@@ -31,7 +31,7 @@ def modified_leuven(p: Floats, s: Floats, w: Floats) -> None:
     n = p[4]
     count = int(p[7])
     widen = w[REACH]
-    level = stribeck_level(p[0], p[1], p[2], p[3], v) * widen
+    level = stribeck_level(p[0], p[1], p[2], p[3], speed_midway(w)) * widen
     cut = longest(n)
     left = abs(w[MOVED])
     direction = math.copysign(1.0, w[MOVED])
@@ -70,6 +70,7 @@ def modified_leuven(p: Floats, s: Floats, w: Floats) -> None:
         reach = p[9 + 2 * i] * widen
         s[i] = min(max(s[i], -reach), reach)
         force += p[8 + 2 * i] * s[i]
+    level = stribeck_level(p[0], p[1], p[2], p[3], v) * widen
     rate = v * flow(math.copysign(1.0, v) * force / level, n)
     w[FRICTION] += (force + p[5] * rate) * w[SCALE] + p[6] * v
 

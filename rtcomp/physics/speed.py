@@ -7,6 +7,7 @@ import math
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
+from rtcomp.physics.level import speed_midway
 from rtcomp.physics.wires import FRICTION, REACH, VELOCITY
 
 
@@ -26,7 +27,7 @@ def micro_damping(p: Floats, s: Floats, w: Floats) -> None:
 @effect_kernel
 def stribeck(p: Floats, s: Floats, w: Floats) -> None:
     """p: rise (1), velocity (m/s)."""
-    ratio = w[VELOCITY] / p[1]
+    ratio = speed_midway(w) / p[1]
     w[REACH] *= 1.0 + p[0] * math.exp(-ratio * ratio)
 
 
