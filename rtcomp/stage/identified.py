@@ -22,7 +22,7 @@ from rtcomp.physics.maxwell_slip import MaxwellSlip
 
 def is_identified(name: object) -> bool:
     """Tell whether `name` is a hysteresis basis rather than a friction model of the catalogue."""
-    return name in bases()
+    return isinstance(name, str) and name in bases()
 
 
 def stop_bank(entry: Mapping[str, Any]) -> Effect:

@@ -1,0 +1,133 @@
+"""Both sides of the force balance agree on what the stage itself made, and differ on wrong beliefs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rtcomp.stage.balance import bandwidth, force_balance, known_force, zero_phase
+from rtcomp.stage.simulate import Simulator
+from rtcomp.stage.stage import Stage
+
+LEUVEN = Stage.load(Path(__file__).parents[2] / "configs" / "leuven.yaml")
+QUIET = LEUVEN.with_changes(sensor={"noise": 0.0, "resolution": 0.0})
+
+
+def recorded(stage, seconds=8.0, stroke=3e-4, seed=0):
+    """Closed loop along three sines, presliding and sliding: time, position, voltage."""
+    rate, simulator = stage.rate, Simulator(stage, seed=seed)
+    t = np.arange(round(seconds * rate)) / rate
+    fade = np.minimum(t / 0.5, 1.0)
+    reference = fade * stroke * (np.sin(2 * np.pi * 0.4 * t) + 0.3 * np.sin(2 * np.pi * 1.7 * t))
+    reference += fade * 2e-5 * np.sin(2 * np.pi * 5 * t)
+    position, voltage = np.empty(t.size), np.empty(t.size)
+    integral = last = volts = 0.0
+    for k in range(t.size):
+        if k:
+            simulator.advance(volts, 1.0 / rate)
+        x = position[k] = simulator.measure()
+        integral = np.clip(integral + 2e5 * (reference[k] - x) / rate, -10.0, 10.0)
+        volts = float(np.clip(2e4 * (reference[k] - x) + integral - 100.0 * (x - last) * rate, -10, 10))
+        voltage[k], last = volts, x
+    return t, position, voltage
+
+
+@pytest.fixture(scope="module")
+def quiet():
+    return recorded(QUIET)
+
+
+def test_the_two_sides_agree_within_one_per_cent(quiet):
+    balance = force_balance(QUIET, *quiet)
+    assert np.abs(balance.force_motion).max() > 4.0  # it did slide
+    assert balance.relative_error < 0.01
+
+
+@pytest.mark.parametrize(
+    "friction",
+    [
+        {"model": "lugre", "stiffness": 4e5, "damping": 300.0, "coulomb": 4.0, "static": 4.8},
+        {"model": "gms", "attraction": 60.0, "coulomb": 4.0, "static": 4.8,
+         "elements": [{"stiffness": 3e5, "weight": 0.4}, {"stiffness": 1e5, "weight": 0.6}]},
+        {"model": "leuven", "damping": 300.0, "coulomb": 4.0, "static": 4.8,
+         "elements": [{"stiffness": 3e5, "reach": 4e-6}, {"stiffness": 2e5, "reach": 2e-5}]},
+    ],
+    ids=lambda f: f["model"],
+)  # fmt: skip
+def test_they_agree_for_every_kind_of_friction(friction):
+    stage = QUIET.with_changes(stage={"friction": friction})
+    assert force_balance(stage, *recorded(stage, 4.0)).relative_error < 0.01
+
+
+def test_a_wrong_belief_shows():
+    """Each believed wrongly by itself, on a motion that exercises it."""
+    fast = QUIET.with_changes(stage={"viscous": 60.0})
+    t, position, voltage = recorded(fast, 4.0, stroke=2e-3)
+    right = force_balance(fast, t, position, voltage).relative_error
+    weaker = [{**e, "stiffness": 0.9 * e["stiffness"]} for e in fast.to_dict()["stage"]["friction"]]
+    for change in ({"mass": 2.6}, {"viscous": 40.0}, {"force_constant": 3.8}, {"friction": weaker}):
+        wrong = force_balance(fast.with_changes(stage=change), t, position, voltage).relative_error
+        assert wrong > 3 * right and wrong > 0.005, change
+
+
+def test_the_wrong_mass_shows_in_proportion():
+    """Free mass: the whole force is inertia, so ten per cent of mass are ten per cent of force."""
+    free = Stage.from_dict({"stage": {"mass": 2.0, "force_constant": 4.0, "voltage_limit": 10.0}})
+    simulator = Simulator(free)
+    t = np.arange(4000) / 1000.0
+    voltage = np.sin(2 * np.pi * 3 * t) + np.sin(2 * np.pi * 8 * t)
+    position = np.empty(t.size)
+    for k, u in enumerate(voltage):
+        position[k] = simulator.position
+        simulator.advance(float(u), 1e-3)
+    assert force_balance(free, t, position, voltage).relative_error < 0.01
+    wrong = free.with_changes(stage={"mass": 2.2})
+    assert force_balance(wrong, t, position, voltage).relative_error == pytest.approx(0.1 / 1.1, rel=0.05)
+
+
+def test_noise_of_an_interferometer_leaves_the_balance_useful():
+    assert force_balance(LEUVEN, *recorded(LEUVEN)).relative_error < 0.05
+
+
+def test_the_bandwidth_is_what_is_told(quiet):
+    assert force_balance(QUIET, *quiet).bandwidth_hz == bandwidth(1000.0) == 100.0
+    assert bandwidth(200.0) == 20.0
+    assert force_balance(QUIET, *quiet, bandwidth_hz=30.0).bandwidth_hz == 30.0
+
+
+def test_the_filter_delays_nothing():
+    t = np.arange(2000) / 1000.0
+    slow = np.sin(2 * np.pi * 3 * t)
+    assert np.abs(zero_phase(slow, 100.0, 1000.0) - slow)[100:-100].max() < 1e-4
+
+
+def test_known_force_is_everything_but_the_friction_model():
+    effects = [
+        {"name": "cogging", "amplitude": 1.2, "period": 5e-4, "phase": 0.3},
+        {"name": "parallel-spring", "stiffness": 3e3, "cubic": 0.0},
+        {"name": "constant-force", "force": 0.4},
+    ]
+    stage = QUIET.with_changes(stage={"effects": effects})
+    t = np.arange(1000) * 1e-3
+    x = 1e-3 * np.sin(2 * np.pi * t)
+    v = 1e-3 * 2 * np.pi * np.cos(2 * np.pi * t)
+    expected = (
+        8.0 * v
+        + 250.0 * np.exp(-((v / 5e-3) ** 2)) * v
+        + 3e3 * x
+        - 0.4
+        - 1.2 * np.sin(2 * np.pi * x / 5e-4 + 0.3)
+    )
+    assert np.allclose(known_force(stage, t, x, v), expected, rtol=0, atol=1e-12)
+    assert np.allclose(known_force(stage, t, x, v, viscous=False), expected - 8.0 * v, rtol=0, atol=1e-12)
+
+
+def test_known_force_keeps_friction_that_is_listed_beside_the_model():
+    """A second friction under ``effects`` is known; only the model that is to be identified is left out."""
+    drag = {"name": "quadratic-drag", "coefficient": 400.0}
+    stage = QUIET.with_changes(stage={"effects": [drag], "viscous": 0.0, "micro_damping": 0.0})
+    t = np.arange(100) * 1e-3
+    v = np.linspace(-0.05, 0.05, 100)
+    assert np.allclose(known_force(stage, t, 0 * v, v), 400.0 * np.abs(v) * v, rtol=0, atol=1e-12)
