@@ -67,11 +67,14 @@ def kind(path: Path) -> str:
     if not head:
         raise RecordingError(f"{path}: is empty")
     found = kind_of(head)
-    expected = _EXPECTED.get(path.suffix.lower(), (CSV, GZIP, MAT5, HDF5))
-    if found not in expected:
-        if found in (CSV, GZIP, MAT5, HDF5):
-            raise RecordingError(f"{path}: is not what its name says: it looks like {found}; rename it")
-        raise RecordingError(f"{path}: looks like {found}; readable are CSV, CSV.gz, MAT and HDF5")
+    readable = (CSV, GZIP, MAT5, HDF5)
+    suffix = path.suffix.lower()
+    # A MATLAB 7.3 file is HDF5 behind a header of its own; without it, it is plain HDF5.
+    plain = suffix == ".mat" and head.startswith(_HDF5_SIGNATURE)
+    if plain or found not in _EXPECTED.get(suffix, readable):
+        what = "is not what its name says: it " if suffix in _EXPECTED else ""
+        do = "rename it" if found in readable else "readable are CSV, CSV.gz, MAT and HDF5"
+        raise RecordingError(f"{path}: {what}looks like {found}; {do}")
     return found
 
 

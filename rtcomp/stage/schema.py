@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, create_model, field_validator
 
 from rtcomp import physics
 from rtcomp.errors import ConfigError, nearest
@@ -90,6 +90,12 @@ class StageFile(Section):
     sensor: Sensor = Field(default_factory=lambda: Sensor.model_validate({}))
     controller: Controller | None = None
     rate: float = Field(1000.0, ge=1.0, le=1e6, description="Hz")
+
+
+StageOfRun: type[StageFile] = create_model(  # type: ignore[call-overload]
+    "StageOfRun", __base__=StageFile, **dict.fromkeys(RUN_SECTIONS, (Any, None))
+)
+"""A stage file that knows what a run configuration's sections are called: the nearest of a misspelt one."""
 
 
 def friction_model(entry: dict[str, Any]) -> physics.Effect:

@@ -16,6 +16,7 @@ from rtcomp.stage.schema import (
     Mechanics,
     Sensor,
     StageFile,
+    StageOfRun,
     friction_model,
 )
 from rtcomp.yamlfile import dump_yaml, load_yaml, validate
@@ -47,7 +48,7 @@ class Stage:
         """Read a stage file (a run configuration will do); raise ConfigError naming file, line and key."""
         file = load_yaml(path)
         data = {key: value for key, value in file.data.items() if key not in RUN_SECTIONS}
-        return cls(validate(StageFile, replace(file, data=data)))
+        return cls(validate(StageOfRun, replace(file, data=data)))
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Stage:
