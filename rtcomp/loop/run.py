@@ -229,3 +229,4 @@ def warm_up(tick: Tick) -> None:
         row[COLUMNS.index("position")] = 1e-9 * k
         tick_kernel(plan, identifier, compensator, tick.settings, state, row, scratch.header, scratch.rows)
     lost_kernel(plan, row, state, scratch.header, scratch.rows)
+    scratch.release()
