@@ -1,0 +1,216 @@
+"""What a diagnosis says, as data; `to_json` is the contract of docs/formats.md."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from rtcomp.kernels import Floats
+from rtcomp.stage.stage import Stage
+
+Verdict = Literal["consistent", "retuned", "missing-physics", "unexplained"]
+
+
+@dataclass(frozen=True)
+class Value:
+    """An estimate with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the estimate as the contract writes it."""
+        return {"value": self.value, "low": self.low, "high": self.high, "unit": self.unit}
+
+
+@dataclass(frozen=True)
+class Retuned:
+    """A parameter of the believed stage that the recording moves: ``mass``, ``friction.level`` ..."""
+
+    parameter: str
+    before: float
+    after: Value
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the change as the contract writes it."""
+        return {
+            "parameter": self.parameter,
+            "from": self.before,
+            "to": self.after.value,
+            "low": self.after.low,
+            "high": self.after.high,
+            "unit": self.after.unit,
+        }
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the mismatch shows: the residual force along one axis (position, speed, time, frequency ...)."""
+
+    axis: str
+    unit: str
+    region: tuple[float, float]
+    share: float
+    """Part of the mismatch (squared) that depends on this axis, 0 to 1."""
+    p_value: float
+    """Of no dependence at all, all axes looked at together."""
+    says: str
+    """One line for a person."""
+    x: Floats
+    """Centres of the bins along the axis, (B,)."""
+    before: Floats
+    """Mean residual force (N) in each bin: what the believed stage, refitted, leaves."""
+    after: Floats | None = None
+    """The same with the extended stage."""
+    spread: Floats | None = None
+    """Standard error of `before` (N)."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the place as the contract writes it."""
+        return {
+            "axis": self.axis,
+            "region": [float(self.region[0]), float(self.region[1])],
+            "share": self.share,
+            "p_value": self.p_value,
+            "says": self.says,
+        }
+
+
+@dataclass(frozen=True)
+class Named:
+    """Physics that is missing: one name, or all that this recording cannot tell apart, likeliest first."""
+
+    names: tuple[str, ...]
+    probability: float
+    parameters: dict[str, Value]
+    """Of the likeliest name."""
+    share: float
+    """Part of the mismatch (squared, above the floor) explained by it, 0 to 1."""
+    separate_by: str = ""
+    curve: tuple[str, str, Floats, Floats, Floats] | None = None
+    """To draw: axis, unit, x (B,), mean residual without it (N), the named curve (N)."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the effect as the contract writes it."""
+        data: dict[str, Any] = {
+            "names": list(self.names),
+            "probability": self.probability,
+            "parameters": {k: v.to_json() for k, v in self.parameters.items()},
+            "share": self.share,
+        }
+        if self.separate_by:
+            data["separate_by"] = self.separate_by
+        return data
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Relative force errors (rms over rms) on parts that neither fitting nor selection saw."""
+
+    before: float
+    retuned: float
+    after: float
+    floor: float
+    """What sensor noise and resolution alone would leave."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """What one entry of the catalogue would have gained."""
+
+    name: str
+    gain: float
+    """Part of the held-out mismatch (squared, above the floor) it explains, alone beside the refitted stage."""
+    z: float
+    """That gain over its standard error."""
+    observable: bool
+    """Whether this recording's motion could show it at all."""
+    smallest: float = math.nan
+    """The size of its first parameter that would have been seen (catalogue unit); NaN where not known."""
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """The next experiment: a reference section, what it tells apart, and how long it takes."""
+
+    reference: dict[str, Any]
+    tells_apart: tuple[str, ...]
+    seconds: float
+    says: str = ""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The whole answer."""
+
+    verdict: Verdict
+    where: Sequence[Place]
+    retuned: Sequence[Retuned]
+    effects: Sequence[Named]
+    """By share, largest first; names ``("unexplained",)`` for what no entry explains."""
+    fit: Fit
+    not_observable: Sequence[str]
+    stage: Stage
+    """The extended stage."""
+    next_experiment: Experiment | None = None
+    candidates: Sequence[Candidate] = ()
+    """Every entry looked at, by gain, largest first."""
+    notes: Sequence[str] = field(default_factory=list)
+    time: Floats = field(default_factory=lambda: np.zeros(0))
+    """s, (K,), of the residuals below."""
+    residual_before: Floats = field(default_factory=lambda: np.zeros(0))
+    """N, (K,): force that the believed stage, refitted, does not account for."""
+    residual_after: Floats = field(default_factory=lambda: np.zeros(0))
+    """N, (K,): the same with the extended stage."""
+    unseen: Floats = field(default_factory=lambda: np.zeros(0))
+    """(K,), 1 where a row took no part in fitting or selection."""
+
+    def sentence(self) -> str:
+        """Return the verdict in one sentence."""
+        named = [" or ".join(e.names) for e in self.effects if e.names != ("unexplained",)]
+        if self.verdict == "consistent":
+            return "Nothing is missing: simulation and recording agree within the noise."
+        if self.verdict == "retuned":
+            moved = ", ".join(r.parameter for r in self.retuned)
+            return f"No physics is missing; other values of {moved} explain the recording."
+        rest = " A part remains that no entry of the catalogue explains." if self._remains else ""
+        if named:
+            return f"Missing: {', and '.join(named)}.{rest}"
+        return f"Something is missing that no entry of the catalogue explains.{rest if named else ''}"
+
+    @property
+    def _remains(self) -> bool:
+        return any(e.names == ("unexplained",) for e in self.effects)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the diagnosis as ``diagnosis.json`` holds it."""
+        data: dict[str, Any] = {
+            "verdict": self.verdict,
+            "where": [p.to_json() for p in self.where],
+            "retuned": [r.to_json() for r in self.retuned],
+            "effects": [e.to_json() for e in self.effects],
+            "fit": {
+                "relative_force_error": {
+                    "before": self.fit.before,
+                    "retuned": self.fit.retuned,
+                    "after": self.fit.after,
+                    "floor": self.fit.floor,
+                }
+            },
+            "not_observable": list(self.not_observable),
+            "notes": list(self.notes),
+        }
+        if self.next_experiment is not None:
+            data["next_experiment"] = {
+                "reference": "reference.yaml",
+                "tells_apart": list(self.next_experiment.tells_apart),
+                "seconds": self.next_experiment.seconds,
+            }
+        return data
