@@ -56,11 +56,24 @@ one that moved faster than the axis may."""
 ) = range(11)
 """Settings: s, N/V, kg, N s/m, m, m, m, m/s, ticks, m (regressor of the offset), 1 for closed loop."""
 
-GOOD, X1, X2, LAST_REFERENCE, LEARNED_AT, EXCESS, FAULT, COMPUTED, UPDATES, STARTED, HISTORY = range(11)
+(
+    GOOD,
+    X1,
+    X2,
+    LAST_REFERENCE,
+    LEARNED_AT,
+    EXCESS,
+    FAULT,
+    COMPUTED,
+    UPDATES,
+    STARTED,
+    MEASURED,
+    HISTORY,
+) = range(12)
 """State: good samples in a row until now; positions one and two ticks ago (m); reference one tick ago (m);
 position at the last update (m); what the limits cut from the last command (V); what the check found;
-execution time of the last tick (us); updates of the weights; whether there was a sample; from here on the commands of
-the last ticks, newest first (V)."""
+execution time of the last tick (us); updates of the weights; whether there was a sample; whether the position
+one tick ago was measured, if only late; from here on the commands of the last ticks, newest first (V)."""
 
 
 class Identifier(NamedTuple):
@@ -141,8 +154,11 @@ def tick_kernel(
         state[FAULT] = NOT_FINITE
     elif position < settings[TRAVEL_LOW] or position > settings[TRAVEL_HIGH]:
         state[FAULT] = TRAVEL
-    elif state[GOOD] > 0.0 and abs(position - state[X1]) > settings[SPEED_LIMIT] * settings[PERIOD]:
-        state[FAULT] = SPEED
+    elif fresh and state[MEASURED] > 0.0:
+        # Two samples of which one is late are up to two periods apart.
+        periods = 1.0 if state[GOOD] > 0.0 and row[_OVERRUN] == 0.0 else 2.0
+        if abs(position - state[X1]) > settings[SPEED_LIMIT] * settings[PERIOD] * periods:
+            state[FAULT] = SPEED
     if state[FAULT] != OK:
         c.limit_s[0] = 0.0
         row[_VOLTAGE] = row[_FEEDFORWARD] = row[_FEEDBACK] = 0.0
@@ -160,6 +176,7 @@ def tick_kernel(
         state[GOOD] += 1.0
     else:
         state[GOOD] = 0.0
+    state[MEASURED] = 1.0 if fresh else 0.0
     state[X2] = state[X1]
     state[X1] = position
     state[LAST_REFERENCE] = plan[REFERENCE]
@@ -198,6 +215,7 @@ def lost_kernel(plan: Floats, row: Floats, state: Floats, header: np.ndarray, ro
     row[_LEARNING] = 0.0
     # What came before the gap is no neighbour of what comes after it.
     state[GOOD] = 0.0
+    state[MEASURED] = 0.0
     state[X1] += plan[REFERENCE] - state[LAST_REFERENCE]
     state[LAST_REFERENCE] = plan[REFERENCE]
     push(header, rows, row)
