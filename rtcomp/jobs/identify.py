@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from rtcomp.control.references import Reference
-from rtcomp.errors import RecordingError
+from rtcomp.errors import Interrupted, RecordingError
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.hysteresis.prior import non_increasing
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.judge import Friction, Judgement, friction_of, judge, learning_curve, reached
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
-from rtcomp.jobs.session import Run, Watch, check, make_device, make_tick, run_loop
+from rtcomp.jobs.session import Run, Watch, check, make_device, make_tick, run_loop, stopped
 from rtcomp.kernels import Floats
 from rtcomp.loop.device import Device
 from rtcomp.loop.tick import Tick
@@ -94,21 +94,20 @@ def identify(
     # A run stopped early is judged all the same: on its second half at least.
     settle = min(settle, 0.5 * float(learned.columns["time"][-1]))
     in_sample = judge(model, own, settle=settle)
-    judged: Run | None = None
-    held_out, on = None, own
-    if config.run.judge.reference is not None and learned.outcome.stopped_by == "end":
-        judged = follow(config, "judge", path=_in(out, "judge.h5"), watch=watch, partial=True)
-    last = judged or learned
-    number = last.signal if last.outcome.stopped_by == "signal" else None
-    if judged is not None and number is None:
-        on = friction(config, judged)
-        held_out = judge(model, on, settle=settle)
-    curve = learning_curve(model.basis, learned.weights, learned.tick.offset_scale, on, settle=settle)
+    held_out, on, number = None, own, None
     notes = never_reached(model)
-    if number is not None:
-        what = "judging" if judged is not None else "learning"
-        at = last.outcome.ticks * config.period
-        notes.append(f"a signal ended {what} after {at:.4g} s; the model was not judged on other motion")
+    unjudged = "the model was not judged on other motion"
+    if learned.outcome.stopped_by == "signal":
+        number = learned.signal
+        notes.append(f"learning {stopped(learned.outcome.ticks * config.period)}; {unjudged}")
+    elif config.run.judge.reference is not None and learned.outcome.stopped_by == "end":
+        try:
+            on = friction(config, follow(config, "judge", path=_in(out, "judge.h5"), watch=watch))
+            held_out = judge(model, on, settle=settle)
+        except Interrupted as error:  # what has been learned is not thrown away
+            number = error.number
+            notes.append(f"judging {error}; {unjudged}")
+    curve = learning_curve(model.basis, learned.weights, learned.tick.offset_scale, on, settle=settle)
     return Identified(config, model, learned, in_sample, held_out, learned.weights_time, curve, notes, number)
 
 

@@ -145,9 +145,10 @@ def test_a_file_that_is_not_what_its_name_says(
 
 
 def test_a_recording_that_is_not_there_and_one_that_is_a_folder(folder: Path) -> None:
+    (folder / "empty").mkdir()
     for command in COMMANDS:
         refused(*arguments(command, "none.h5"), at=folder, says=["none.h5: there is no such file"])
-        refused(*arguments(command, "results"), at=folder, says=["results: is a folder"])
+        refused(*arguments(command, "empty"), at=folder, says=["empty: is a folder"])
 
 
 def test_windows_beyond_the_recording_are_named(folder: Path) -> None:
