@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import platform
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
@@ -243,9 +244,9 @@ def run_loop(
     counters = dict(getattr(device, "counters", {}))
     delay = device.delay_ticks
     if path is None:
-        every = max(1, round(WEIGHTS_EVERY * config.stage.rate))
+        every = max(1, math.ceil(WEIGHTS_EVERY * config.stage.rate - 1e-6))  # as a recording holds them
         recorded = {name: rows[:, j].copy() for j, name in enumerate(columns)}
-        history = rows[every - 1 :: every]
+        history = rows[::every]
         return Run(
             recorded, history[:, 0].copy(), history[:, len(columns) :].copy(), outcome, tick, delay,
             config.stage.rate, in_loop, counters, signal=stop.number,
