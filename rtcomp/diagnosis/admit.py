@@ -70,8 +70,8 @@ def _alike(recordings: Sequence[Recording]) -> None:
                 other.voltage, recording.voltage
             ):
                 raise RecordingError(
-                    f"{recording.path} holds the same rows as {other.path}; give each recording once, or what "
-                    "was fitted would be judged on itself"
+                    f"{recording.path} holds the same rows as {other.path}; give each recording once, or "
+                    "what was fitted would be judged on itself"
                 )
 
 

@@ -26,7 +26,8 @@ def moved(recording: Recording, noise: float) -> None:
     good = recording.trusted
     if np.count_nonzero(good) < _TRUSTED * len(recording):
         raise RecordingError(
-            f"{path}: {100 * (1 - good.mean()):.0f} % of its rows are outliers or bridged gaps; record it again"
+            f"{path}: {100 * (1 - good.mean()):.0f} % of its rows are outliers or bridged gaps; "
+            "record it again"
         )
     span = float(np.ptp(voltage))
     if span <= 1e-12 * float(np.max(np.abs(voltage))):
@@ -102,8 +103,8 @@ def check(recordings: Sequence[Recording]) -> list[str]:
             what = f"{first.path}: moves" if len(recordings) == 1 else "the recordings move"
             raise RecordingError(
                 f"{what} in one direction only ({which}, from {first.position[0]:.4g} to "
-                f"{first.position[-1]:.4g} m), without a reversal; friction and all that differs by direction "
-                "needs motion both ways"
+                f"{first.position[-1]:.4g} m), without a reversal; friction and all that differs by "
+                "direction needs motion both ways"
             )
         return ["no recording has a reversal in it: what happens at reversals cannot be seen"]
     if total < FEW_REVERSALS:
