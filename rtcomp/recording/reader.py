@@ -85,7 +85,7 @@ def read(
     needed: Sequence[str] = NEEDED,
     mark_outliers: bool = True,
 ) -> Recording:
-    """Read the recording at `path`.
+    """Read the recording at `path`, a file, or a folder that holds one recording and no more.
 
     `column_map` says which column of the file is which: ``{"position": "qm"}``. Uneven rows are resampled
     to `rate_hz` (default: their median rate) by `method` ``cubic`` or ``linear``; even rows only where
@@ -102,6 +102,8 @@ def read(
         raise ConfigError(f"rate is {rate_hz:g} Hz; allowed is (0, 1e7)")
     if method not in METHODS:
         raise ConfigError(f"resampling method is {method!r}; it must be one of {', '.join(METHODS)}")
+    if path.is_dir():
+        path = tables.recording_in(path)
     table = load(path)
     _rename(path, table, column_map or {})
     _one_length(path, table, needed, rate_hz)

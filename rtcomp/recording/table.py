@@ -49,6 +49,28 @@ _EXPECTED: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 
 
+def recording_in(folder: Path) -> Path:
+    """Return the one file in `folder` that is a recording by its name.
+
+    Raises RecordingError, saying what is there, where none is or several are.
+    """
+    try:
+        names = sorted(path.name for path in folder.iterdir() if path.is_file())
+    except OSError as error:
+        raise RecordingError(f"{folder}: cannot be read: {error.strerror}") from None
+    found = [name for name in names if Path(name.lower()).suffix in _EXPECTED]
+    if len(found) == 1:
+        return folder / found[0]
+    if found:
+        raise RecordingError(f"{folder}: is a folder with {len(found)} recordings; name one: {_few(found)}")
+    there = f"it holds {_few(names)}" if names else "it is empty"
+    raise RecordingError(f"{folder}: is a folder without a recording (.csv, .csv.gz, .mat, .h5); {there}")
+
+
+def _few(names: list[str], most: int = 8) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
 def kind(path: Path) -> str:
     """Return what the file at `path` is by its content: CSV, GZIP, MAT5 or HDF5.
 

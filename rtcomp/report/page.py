@@ -47,14 +47,16 @@ class Section(NamedTuple):
 class Page:
     """What a report says. All text is plain: nothing in it is read as HTML.
 
-    `verdict` is the answer in a sentence or several; `tone` colours it. `configuration` is the file as run,
-    shown folded; `versions` and other metadata stand at the foot.
+    `verdict` is the answer in a sentence or several; `tone` colours it. `notes` say what else a person should
+    know, below the figures. `configuration` is the file as run, shown folded; `versions` and other metadata
+    stand at the foot.
     """
 
     title: str
     subtitle: str = ""
     verdict: str | Sequence[str] = ()
     summary: Sequence[Row] = ()
+    notes: Sequence[str] = ()
     sections: Sequence[Section] = ()
     configuration: str = ""
     versions: Mapping[str, Any] = field(default_factory=dict)
@@ -92,7 +94,7 @@ def render_page(page: Page) -> str:
         '<meta name="color-scheme" content="light dark">\n'
         f"<title>{title}</title>\n<style>\n{_style()}</style>\n</head>\n<body>\n<main>\n"
         f"<header>\n<h1>{title}</h1>\n{_if(page.subtitle, 'p', 'subtitle')}</header>\n"
-        f"{_verdict(page)}{_summary(page.summary)}{_contents(page.sections)}{_sections(page.sections)}"
+        f"{_verdict(page)}{_summary(page.summary)}{_notes(page.notes)}{_contents(page.sections)}{_sections(page.sections)}"
         f"{_foot(page)}</main>\n{scripts}</body>\n</html>\n"
     )
 
@@ -147,6 +149,11 @@ def _summary(rows: Sequence[Row]) -> str:
             f'<td class="note">{_text(row.note)}</td></tr>\n'
         )
     return f'<table class="summary">\n<tbody>\n{"".join(cells)}</tbody>\n</table>\n'
+
+
+def _notes(notes: Sequence[str]) -> str:
+    lines = "".join(f"<li>{_text(note[:1].upper() + note[1:])}</li>\n" for note in notes if note)
+    return f'<ul class="notes">\n{lines}</ul>\n' if lines else ""
 
 
 def _contents(sections: Sequence[Section]) -> str:

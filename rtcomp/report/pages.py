@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from rtcomp.jobs.demo import FADE, SWITCH_AT, Demonstrated
 from rtcomp.jobs.identify import Identified, friction_level
 from rtcomp.jobs.judge import Judgement
 from rtcomp.jobs.session import Run
+from rtcomp.kernels import Floats
 from rtcomp.report.figures.hysteresis import first_reversal, loop_figure, virgin_figure
 from rtcomp.report.figures.learning import Curve, learning_figure
 from rtcomp.report.figures.motion import force_figure, position_figure
@@ -24,6 +25,9 @@ from rtcomp.report.figures.tracking import tracking_figure
 from rtcomp.report.page import Page, Row, Section
 from rtcomp.units import for_axis
 from rtcomp.yamlfile import dump_yaml
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
 
 
 def identified_rows(done: Identified) -> list[Row]:
@@ -71,8 +75,8 @@ def timing_rows(*runs: Run) -> list[Row]:
     return rows
 
 
-def identified_page(done: Identified) -> Page:
-    """Return the report of `rtcomp identify`."""
+def identified_page(done: Identified, recording: str = "") -> Page:
+    """Return the report of `rtcomp identify`; `recording` names the file where there was one."""
     judged = done.held_out or done.in_sample
     what = (
         "motion that it was not learned from"
@@ -85,9 +89,10 @@ def identified_page(done: Identified) -> Page:
     ]
     return Page(
         title="Friction hysteresis, identified",
-        subtitle=_subtitle(done.config),
-        verdict=[*verdict, *done.notes],
+        subtitle=_subtitle(done.config, recording),
+        verdict=verdict,
         summary=identified_rows(done),
+        notes=done.notes,
         sections=[
             *_model_sections(done, judged),
             *_motion_sections(done.run, done.config, done),
@@ -122,11 +127,16 @@ def simulated_page(config: Configuration, run: Run, *, open_loop: bool) -> Page:
         summary=simulated_rows(config, run),
         sections=[
             Section("Position", "", position_figure(c["time"], c["position"], reference, unit=unit)),
-            Section("Command", "", force_figure(c["time"], c["voltage"], unit="V", title="Command")),
+            Section("Command", "", _command_figure(run)),
         ],
         configuration=_configuration(config),
         versions=versions(run),
     )
+
+
+def _command_figure(run: Run) -> go.Figure:
+    c = run.columns
+    return force_figure(c["time"], c["voltage"], unit="V", title="Command", name="command")
 
 
 def compensated_rows(done: Compensated) -> list[Row]:
@@ -138,7 +148,7 @@ def compensated_rows(done: Compensated) -> list[Row]:
         Row("Tracking error with, rms", b.rms, unit),
         Row("Smaller by", f"{done.improvement:.1f} times"),
         Row("Tracking error without, peak", a.peak, unit),
-        Row("Tracking error with, peak", b.peak, unit, "the paper's rig: 5 um"),
+        Row("Tracking error with, peak", b.peak, unit, "the paper's rig: 5 um" if unit == "m" else ""),
         *timing_rows(done.without, done.with_it),
     ]
 
@@ -192,7 +202,10 @@ def demo_page(done: Demonstrated) -> Page:
     time, error = done.live.tracking_error()
     on = time >= SWITCH_AT
     watched = tracking_figure((time[~on], error[~on]), (time[on], error[on]), unit=unit)
-    says = f"One run: the model learns from the start; from {SWITCH_AT:g} s on it is fed forward."
+    says = (
+        f"One run: the model learns from the start; from {SWITCH_AT:g} s on it is fed forward, in full after "
+        f"{FADE:g} s. The figures of the second part count that time too."
+    )
     return Page(
         title="Friction hysteresis, identified and compensated",
         subtitle=_subtitle(i.config),
@@ -226,11 +239,13 @@ def tracking_section(done: Compensated) -> Section:
 def _model_sections(done: Identified, judged: Judgement) -> list[Section]:
     unit, force = for_axis("m", done.config.stage.axis), for_axis("N", done.config.stage.axis)
     counted = judged.counted > 0
-    position = judged.friction.position[counted]
+    shown = slice(int(np.argmax(counted)), counted.size - int(np.argmax(counted[::-1])))
+    position = judged.friction.position[shown]
     loop = loop_figure(
         position,
-        judged.friction.force[counted],
-        judged.model[counted],
+        # Rows that do not count break the line.
+        np.where(counted[shown], judged.friction.force[shown], np.nan),
+        np.where(counted[shown], judged.model[shown], np.nan),
         virgin_rows=first_reversal(position) if counted.all() else 0,
         held_out_percent=100 * judged.relative if done.held_out is not None else None,
         unit=unit,
@@ -280,9 +295,15 @@ def _motion_sections(run: Run, config: Configuration, done: Identified | None = 
         "As the identifier saw it while running; what it predicted at that moment beside it." if done else ""
     )
     return [
-        Section("Position", "", position_figure(c["time"], c["position"], c["reference"], unit=unit)),
+        Section("Position", "", position_figure(c["time"], c["position"], _reference(run), unit=unit)),
         Section("Friction force", says, force_figure(c["time"], c["force"], c["force_model"], unit=force)),
     ]
+
+
+def _reference(run: Run) -> Floats | None:
+    """Return the reference (m), None where a recording had none and its position stands in that place."""
+    reference, position = run.columns["reference"], run.columns["position"]
+    return None if np.count_nonzero(reference != position) < 0.5 * position.size else reference
 
 
 def _timing(run: Run) -> list[Section]:
@@ -298,8 +319,9 @@ def _timing(run: Run) -> list[Section]:
     return sections
 
 
-def _subtitle(config: Configuration) -> str:
-    return f"{config.path.name}, {config.stage.rate:g} Hz, device {config.run.device.get('driver')}"
+def _subtitle(config: Configuration, recording: str = "") -> str:
+    source = f"recording {recording}" if recording else f"device {config.run.device.get('driver')}"
+    return f"{config.path.name}, {config.stage.rate:g} Hz, {source}"
 
 
 def _configuration(config: Configuration) -> str:

@@ -38,13 +38,13 @@ class _Elapsed(ProgressColumn):
 
 
 class _Figures(ProgressColumn):
-    """The figures of the job: ``held-out 1.3 %   rms 12 nm``."""
+    """The figures of the job: ``held-out 1.3 %  rms 12 nm``."""
 
     def render(self, task: Task) -> Text:
         line = Text(no_wrap=True, overflow="ellipsis")
         for name, value in task.fields["figures"].items():
             line.append(f"{name} ", style="dim")
-            line.append(f"{value}   ")
+            line.append(f"{value}  ")
         line.rstrip()
         return line
 
@@ -70,7 +70,8 @@ class Progress:
     def __enter__(self) -> Progress:
         if self._on:
             self._bar = RichProgress(
-                TextColumn("{task.description}", markup=False), BarColumn(bar_width=24),
+                TextColumn("{task.description}", markup=False),
+                BarColumn(bar_width=24 if self._console.width >= 100 else 10),
                 _Percent(), _Elapsed(), _Figures(), console=self._console, auto_refresh=False,
             )  # fmt: skip
             self._bar.start()
@@ -109,9 +110,10 @@ def summary_table(title: str, rows: Sequence[Row | tuple[Any, ...]]) -> Table:
     table = Table(
         title=Text(title, style="bold"), title_justify="left", show_header=False, box=box.HORIZONTALS
     )
-    table.add_column(overflow="fold")
-    table.add_column(justify="right", style="bold", overflow="fold")
     lines = [Row(*row) for row in rows]
+    # Where it is narrow the notes wrap, not the names.
+    table.add_column(overflow="fold", min_width=min(max((len(row.name) for row in lines), default=0), 40))
+    table.add_column(justify="right", style="bold", overflow="fold")
     noted = any(row.note for row in lines)
     if noted:
         table.add_column(style="dim", overflow="fold")

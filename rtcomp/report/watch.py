@@ -27,6 +27,7 @@ class TerminalWatch:
 
     def __init__(self, titles: Sequence[str], *, quiet: bool = False, unit: str = "m") -> None:
         self._titles = list(titles)
+        self._width = max((len(title) for title in titles), default=0)
         self._quiet = quiet
         self._unit = unit
         self._progress: Progress | None = None
@@ -75,7 +76,7 @@ class TerminalWatch:
             progress.__exit__(None, None, None)
 
     def _title(self) -> str:
-        return self._titles.pop(0) if self._titles else "run"
+        return (self._titles.pop(0) if self._titles else "run").ljust(self._width)
 
 
 def figures(ring: Ring, columns: Sequence[str], unit: str = "m") -> dict[str, Any]:
@@ -88,11 +89,11 @@ def figures(ring: Ring, columns: Sequence[str], unit: str = "m") -> dict[str, An
     column = {name: rows[:, j] for j, name in enumerate(columns)}
     error = column["reference"] - column["position"]
     peak = float(np.abs(column["force"]).max())
-    shown = {"tracking error": f"{si(float(np.sqrt(np.mean(error**2))), unit)} rms"}
+    shown = {"error": f"{si(float(np.sqrt(np.mean(error**2))), unit)} rms"}
     if peak > 0.0:
         residual = float(np.sqrt(np.mean((column["force"] - column["force_model"]) ** 2)))
-        shown["model off by"] = f"{100 * residual / peak:.1f} %"
-    shown["late"] = f"{int(np.count_nonzero(column['overrun']))} of the last {count}"
+        shown["model off"] = f"{100 * residual / peak:.1f} %"
+    shown["late"] = f"{int(np.count_nonzero(column['overrun']))} of {count}"
     return shown
 
 

@@ -193,6 +193,25 @@ def test_text_that_is_not_numbers(tmp_path: Path) -> None:
     assert "two columns are named 'time'" in refusal(path)
 
 
+def test_a_folder_with_one_recording_stands_for_it(tmp_path: Path) -> None:
+    (tmp_path / "README.md").write_text("about it\n")
+    columns = motion(50)
+    path = write_any(tmp_path / "Run.CSV", columns)
+    recording = read(tmp_path)
+    assert recording.path == path
+    assert np.array_equal(recording.position, columns["position"])
+    write_any(tmp_path / "second.h5", columns)
+    assert "a folder with 2 recordings; name one: Run.CSV, second.h5" in refusal(tmp_path)
+
+
+def test_a_folder_without_a_recording_says_what_it_holds(tmp_path: Path) -> None:
+    assert "it is empty" in refusal(tmp_path)
+    for k in range(9):
+        (tmp_path / f"{k}.txt~").write_text("x")
+    line = refusal(tmp_path)
+    assert "without a recording" in line and "it holds 0.txt~" in line and line.endswith("7.txt~ and 1 more")
+
+
 def test_missing_empty_and_folders(tmp_path: Path) -> None:
     assert "no such file" in refusal(tmp_path / "a.csv")
     assert "is a folder" in refusal(tmp_path)

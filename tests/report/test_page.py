@@ -51,6 +51,7 @@ def page() -> Page:
             Section("Curves", "", overlay_figure([Curve(EVIL, t, t)], x_title="a", y_title="b")),
             Section("Words only", "No figure here."),
         ],
+        notes=["something to know", EVIL],
         configuration=f"stage:\n  mass: 2.0  # {EVIL}\n",
         versions={"rtcomp": "0.1", EVIL: EVIL},
     )
@@ -125,3 +126,10 @@ def test_a_place_that_cannot_be_written_is_one_clear_line(tmp_path: Path) -> Non
     with pytest.raises(RtcompError, match=r"report\.html") as caught:
         write_page(tmp_path / "no" / "such" / "report.html", Page("x"))
     assert "\n" not in str(caught.value)
+
+
+def test_notes_stand_below_the_figures_as_sentences() -> None:
+    text = render_page(page())
+    assert "<li>Something to know</li>" in text
+    assert text.index("</table>") < text.index("Something to know") < text.index("<nav")
+    assert '<ul class="notes">' not in render_page(Page("Bare"))

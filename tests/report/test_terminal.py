@@ -119,3 +119,11 @@ def test_the_summary_is_text_with_units_whatever_the_names() -> None:
 
 def test_a_summary_without_notes_has_no_empty_column() -> None:
     assert len(summary_table("x", [("a", 1), ("b", 2.0, "m")]).columns) == 2
+
+
+def test_where_it_is_narrow_the_notes_wrap_and_the_names_do_not() -> None:
+    out = StringIO()
+    rows = [("Live run, before feedforward, rms", 2.38e-5, "m", "a note " * 12), ("b", 1, "", "")]
+    print_summary("t", rows, Console(file=out, width=80))
+    assert "Live run, before feedforward, rms" in out.getvalue()
+    assert max(len(line) for line in out.getvalue().splitlines()) <= 80

@@ -58,13 +58,15 @@ def force_figure(
     *,
     unit: str = "N",
     title: str = "Force",
+    name: str = "measured",
     points: int = c.POINTS,
 ) -> go.Figure:
     """Return measured and, where there is one, modelled force against time.
 
-    `time` in s; forces of the same length in `unit` (``"N"``, ``"N m"``, or ``"V"`` with another `title`).
+    `time` in s; forces of the same length in `unit` (``"N"``, ``"N m"``, or ``"V"`` with another `title` and
+    another `name` for the first curve).
     """
-    curves = [("measured", c.floats(measured), palette.MEASURED, 1.6 if model is None else 4.5, "solid")]
+    curves = [(name, c.floats(measured), palette.MEASURED, 1.6 if model is None else 4.5, "solid")]
     if model is not None:
         curves.append(("model", c.floats(model), palette.MODEL, 1.4, "solid"))
     return _against_time(time, curves, title, unit, points)
