@@ -18,8 +18,8 @@ def constant_force(p: Floats, s: Floats, w: Floats) -> None:
 
 @effect_kernel
 def tonal_disturbance(p: Floats, s: Floats, w: Floats) -> None:
-    """p: amplitude (N), frequency (Hz)."""
-    w[PUSH] += p[0] * math.sin(2.0 * math.pi * p[1] * w[TIME])
+    """p: amplitude (N), frequency (Hz), phase (rad)."""
+    w[PUSH] += p[0] * math.sin(2.0 * math.pi * p[1] * w[TIME] + p[2])
 
 
 @register
@@ -48,10 +48,11 @@ class TonalDisturbance(Effect):
     parameters = (
         Parameter("amplitude", "N", -1e6, 1e6, "size of the force"),
         Parameter("frequency", "Hz", 0.0, 1e5, "its frequency"),
+        Parameter("phase", "rad", -100.0, 100.0, "angle at time zero of the run", 0.0),
     )
     kernel = tonal_disturbance
     says = "a force at one frequency: floor vibration, a fan, mains"
-    equation = "F = a sin(2 pi f t)"
+    equation = "F = a sin(2 pi f t + phase)"
     source = "Gordon (1999), Proc. SPIE 3786, generic vibration criteria"
     signature = "a line in the spectrum of the residual force, at the same frequency whatever the motion"
     experiment = "holding still for longer than ten periods, then slow motion"

@@ -14,7 +14,7 @@ import math
 
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
-from rtcomp.physics.drive import PERIOD
+from rtcomp.physics.drive import PERIOD, PHASE
 from rtcomp.physics.effect import Effect, Parameter, Place
 from rtcomp.physics.wires import NOISE, SENSED
 
@@ -33,18 +33,21 @@ def sensor_scale_inverse(p: Floats, s: Floats, w: Floats) -> None:
 
 @effect_kernel
 def sensor_periodic_error(p: Floats, s: Floats, w: Floats) -> None:
-    """p: amplitude (m), period (m)."""
-    w[SENSED] += p[0] * math.sin(2.0 * math.pi * w[SENSED] / p[1])
+    """p: amplitude (m), period (m), phase (rad)."""
+    w[SENSED] += p[0] * math.sin(2.0 * math.pi * w[SENSED] / p[1] + p[2])
 
 
 @effect_kernel
 def sensor_periodic_error_inverse(p: Floats, s: Floats, w: Floats) -> None:
-    """p: amplitude (m), period (m). Newton on x + a sin(k x) = reading; one root where |a k| < 1."""
+    """p: amplitude (m), period (m), phase (rad). Newton on x + a sin(k x + phase) = reading.
+
+    One root where |a k| < 1.
+    """
     k = 2.0 * math.pi / p[1]
     x = w[SENSED]
     for _ in range(20):
-        slope = max(1.0 + p[0] * k * math.cos(k * x), 0.05)
-        change = (x + p[0] * math.sin(k * x) - w[SENSED]) / slope
+        slope = max(1.0 + p[0] * k * math.cos(k * x + p[2]), 0.05)
+        change = (x + p[0] * math.sin(k * x + p[2]) - w[SENSED]) / slope
         x -= change
         if abs(change) < 1e-15 * p[1]:
             break
@@ -93,13 +96,13 @@ class SensorPeriodicError(Effect):
 
     name = "sensor-periodic-error"
     place = Place.SENSOR
-    parameters = (Parameter("amplitude", "m", -1e3, 1e3, "size of the error"), PERIOD)
+    parameters = (Parameter("amplitude", "m", -1e3, 1e3, "size of the error"), PERIOD, PHASE)
     kernel = sensor_periodic_error
     inverse = sensor_periodic_error_inverse
     says = (
         "the reading errs periodically: cyclic error of an interferometer, sub-divisional error of an encoder"
     )
-    equation = "y = x + a sin(2 pi x / period)"
+    equation = "y = x + a sin(2 pi x / period + phase)"
     source = "Wu, Deslattes (1998), Applied Optics 37(28), periodic nonlinearity"
     signature = "apparent acceleration, periodic in position, that grows with the square of speed"
     experiment = "the same stretch slowly and fast"

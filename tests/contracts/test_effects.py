@@ -80,12 +80,12 @@ VOCABULARY = {
     "sensor": {
         "sensor-scale": "scale (1)",
         "sensor-delay": "delay (s)",
-        "sensor-periodic-error": "amplitude (m), period (m)",
+        "sensor-periodic-error": "amplitude (m), period (m), phase (rad)",
         "sensor-drift": "drift (m), time_constant (s)",
         "sensor-jump": "size (m), time (s)",
     },
     "disturbance": {
-        "tonal-disturbance": "amplitude (N), frequency (Hz)",
+        "tonal-disturbance": "amplitude (N), frequency (Hz), phase (rad)",
         "constant-force": "force (N)",
     },
 }
