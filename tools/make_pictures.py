@@ -1,18 +1,21 @@
-"""Make the pictures of the README from finished runs: docs/figures/NAME.svg and NAME-dark.svg.
+"""Make the pictures of the README: docs/figures/NAME.svg and NAME-dark.svg.
 
-    rtcomp identify configs/leuven.yaml --out out/leuven
-    rtcomp compensate configs/leuven.yaml --model out/leuven/model.yaml --out out/tracking
-    tools/make_pictures.py out/leuven out/tracking
+    python tools/make_pictures.py
+    python tools/make_pictures.py out/identify out/compensate
 
-The first folder gives the loop: the motion that the model was judged on, beside the model with frozen
-weights. The second gives the tracking error without and with compensation. Figures are counted as the runs'
-own reports count them. Needs matplotlib (extra `dev`): plotly's own static pictures need a browser.
+Without folders, identifies and compensates configs/leuven.yaml first. The first folder gives the loop: the
+motion that the model was judged on, beside the model with frozen weights. The second gives the tracking error
+without and with compensation. Figures are counted as the runs' own reports count them. Needs matplotlib
+(extra `dev`): plotly's own static pictures need a browser.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
+import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +24,7 @@ import h5py
 import matplotlib as mpl
 import numpy as np
 
+from rtcomp.cli.main import run
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.jobs.judge import friction_of
 from rtcomp.kernels import Floats
@@ -217,19 +221,40 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("identified", type=Path, help="folder of rtcomp identify")
-    parser.add_argument("compensated", type=Path, help="folder of rtcomp compensate")
+    parser.add_argument("identified", type=Path, nargs="?", help="folder of rtcomp identify")
+    parser.add_argument("compensated", type=Path, nargs="?", help="folder of rtcomp compensate")
     parser.add_argument("--out", type=Path, default=TOP / "docs" / "figures")
     parser.add_argument("--name", default="compensation")
     given = parser.parse_args(arguments)
-    loop, axis = loop_of(given.identified)
-    tracking = tracking_of(given.compensated)
+    if given.identified is not None and given.compensated is None:
+        parser.error("give both folders, or none")
+    with contextlib.ExitStack() as stack:
+        if given.identified is None:
+            given.identified, given.compensated = stack.enter_context(finished_runs())
+        loop, axis = loop_of(given.identified)
+        tracking = tracking_of(given.compensated)
     for suffix, dark in (("", False), ("-dark", True)):
         path = given.out / f"{given.name}{suffix}.svg"
         static_picture(
             path, loop, tracking, dark=dark, unit=for_axis("m", axis), force_unit=for_axis("N", axis)
         )
         print(path)
+
+
+@contextlib.contextmanager
+def finished_runs() -> Iterator[tuple[Path, Path]]:
+    """Identify and compensate the simulated stage; give both folders while the context lasts."""
+    config = str(TOP / "configs" / "leuven.yaml")
+    with tempfile.TemporaryDirectory() as place:
+        identified, compensated = Path(place) / "identified", Path(place) / "compensated"
+        model = ["--model", str(identified / "model.yaml")]
+        for command in (
+            ["identify", config, "--out", str(identified)],
+            ["compensate", config, *model, "--out", str(compensated)],
+        ):
+            if run(command) != 0:
+                raise SystemExit(f"rtcomp {' '.join(command)} did not end well")
+        yield identified, compensated
 
 
 if __name__ == "__main__":
