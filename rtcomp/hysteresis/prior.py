@@ -33,5 +33,6 @@ def non_increasing(weights: Floats, information: Floats, free: int = 0) -> Float
     columns = root @ steps
     norms = np.linalg.norm(columns, axis=0)
     low = np.where(np.arange(weights.size) < n, 0.0, -np.inf)
-    found = lsq_linear(columns / norms, root @ weights, bounds=(low, np.inf), tol=1e-12)
+    with np.errstate(invalid="ignore"):  # a step of the solver that meets no bound is 0 times infinity to it
+        found = lsq_linear(columns / norms, root @ weights, bounds=(low, np.inf), tol=1e-12)
     return np.asarray(steps @ (found.x / norms))
