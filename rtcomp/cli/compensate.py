@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from rtcomp.cli.options import json_option, output_options
+from rtcomp.cli.options import Within, json_option, output_options
 from rtcomp.cli.output import prepare_output
 from rtcomp.cli.runs import device_options, finish, load
 from rtcomp.errors import Interrupted
@@ -19,7 +19,7 @@ from rtcomp.errors import Interrupted
 )
 @output_options("out/compensate")
 @device_options
-@click.option("--seconds", type=click.FloatRange(0.1, 1e6), help="Length of each run, instead of the file's.")
+@click.option("--seconds", type=Within(0.1, 1e6), help="Length of each run, instead of the file's.")
 @json_option
 def compensate(
     config: Path,

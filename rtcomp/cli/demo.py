@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from rtcomp.cli.options import json_option, output_options
+from rtcomp.cli.options import Within, json_option, output_options
 from rtcomp.cli.output import prepare_output
 from rtcomp.cli.runs import finish, lasting, load
 
@@ -15,10 +15,8 @@ from rtcomp.cli.runs import finish, lasting, load
 @click.command()
 @output_options("out/demo")
 @click.option("--config", type=click.Path(path_type=Path), help="Another configuration than leuven.yaml.")
-@click.option(
-    "--serial", is_flag=True, help="In real time over a serial link, stage in another process."
-)
-@click.option("--seconds", type=click.FloatRange(8.0, 1e6), help="Length of each run, instead of the file's.")
+@click.option("--serial", is_flag=True, help="In real time over a serial link, stage in another process.")
+@click.option("--seconds", type=Within(8.0, 1e6), help="Length of each run, instead of the file's.")
 @json_option
 def demo(
     out: Path, force: bool, config: Path | None, serial: bool, seconds: float | None, as_json: bool

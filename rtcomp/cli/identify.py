@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from rtcomp.cli.options import json_option, map_option, output_options
+from rtcomp.cli.options import Within, json_option, map_option, output_options
 from rtcomp.cli.output import prepare_output
 from rtcomp.cli.runs import device_options, finish, load
 from rtcomp.errors import Interrupted
@@ -17,7 +17,7 @@ from rtcomp.errors import Interrupted
 @click.argument("recording", required=False, type=click.Path(path_type=Path))
 @output_options("out/identify")
 @device_options
-@click.option("--seconds", type=click.FloatRange(0.1, 1e6), help="Length of each run, instead of the file's.")
+@click.option("--seconds", type=Within(0.1, 1e6), help="Length of each run, instead of the file's.")
 @map_option
 @json_option
 def identify(
@@ -33,6 +33,7 @@ def identify(
 ) -> None:
     """Identify the friction's hysteresis of the device in CONFIG while it moves, or of a RECORDING.
 
+    RECORDING is a CSV, MAT or HDF5 file, or a folder that holds one.
     Weights are learned tick by tick, then frozen and judged on motion that they were not learned from. The
     folder holds model.yaml (usable as a stage's friction), recording.h5, the configuration as run,
     summary.json and report.html.
@@ -68,7 +69,7 @@ def identify(
         done.model.save(work / "model.yaml")
         finish(
             out, work, done.config, "identified", identified_rows(done), done.summary(),
-            identified_page(done), as_json,
+            identified_page(done, data.path.name if data is not None else ""), as_json,
         )  # fmt: skip
         if not as_json:
             for note in done.notes:

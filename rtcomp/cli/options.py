@@ -13,6 +13,7 @@ from rtcomp.cli.output import prepare_output
 
 __all__ = [
     "Frequency",
+    "Within",
     "force_option",
     "json_option",
     "map_option",
@@ -37,6 +38,17 @@ class Frequency(click.ParamType[float]):
             number = math.nan
         if not (math.isfinite(number) and number > 0.0):
             self.fail(f"{value!r} is not a rate; give a positive number of Hz", param, ctx)
+        return number
+
+
+class Within(click.FloatRange):
+    """A finite number within a range; `click.FloatRange` lets NaN pass."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number, or fail with what is allowed."""
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is not a finite number", param, ctx)
         return number
 
 

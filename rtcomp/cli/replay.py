@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from rtcomp.cli.options import force_option, json_option, map_option, rate_option
+from rtcomp.cli.options import Within, force_option, json_option, map_option, rate_option
 from rtcomp.cli.runs import to_json
 
 
@@ -17,7 +17,7 @@ from rtcomp.cli.runs import to_json
 @force_option
 @map_option
 @rate_option
-@click.option("--bandwidth", type=click.FloatRange(0, min_open=True), help="Hz, of the comparison.")
+@click.option("--bandwidth", type=Within(0, min_open=True), help="Hz, of the comparison.")
 @json_option
 def replay(
     recording: Path,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from rtcomp.cli.options import json_option, map_option, output_options
+from rtcomp.cli.options import Within, json_option, map_option, output_options
 from rtcomp.cli.output import prepare_output
 from rtcomp.cli.runs import finish, lasting, load
 
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
     "--voltage", "recording", type=click.Path(path_type=Path),
     help="Open loop: the recording whose voltage drives the stage.",
 )  # fmt: skip
-@click.option("--seconds", type=click.FloatRange(0.1, 1e6), help="Length of the run, instead of the file's.")
-@click.option("--substeps", type=click.FloatRange(1, 1000), default=1.0, help="Finer integration.")
+@click.option("--seconds", type=Within(0.1, 1e6), help="Length of the run, instead of the file's.")
+@click.option("--substeps", type=Within(1, 1000), default=1.0, help="Finer integration.")
 @map_option
 @json_option
 def simulate(
@@ -86,8 +87,12 @@ def simulate(
 
 
 def _with_reference(config: Configuration, path: Path) -> Configuration:
-    from rtcomp.yamlfile import load_yaml
+    from rtcomp.jobs.configuration import Configuration
+    from rtcomp.yamlfile import YamlFile, load_yaml
 
     file = load_yaml(path)
-    section = file.data.get("reference", file.data)
-    return config.changed(reference=section)
+    if "reference" not in file.data:  # the section's content alone
+        lines = {("reference", *key): line for key, line in file.lines.items()}
+        file = YamlFile({"reference": file.data}, path, lines)
+    data = {**config.file.data, "reference": file.data["reference"]}
+    return Configuration.of(replace(config.file, data=data, origins={"reference": file}))

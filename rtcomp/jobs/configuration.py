@@ -237,8 +237,7 @@ class Configuration:
         try:
             self._check(reference)
         except LimitError as error:
-            line = self.file.line(tuple(key.split(".")))
-            raise LimitError(f"{self.path}:{line}: {key}: {error}") from error
+            raise LimitError(f"{self.file.at(tuple(key.split('.')))}: {key}: {error}") from error
         return reference
 
     def _check_times(self, section: str, duration: float) -> None:

@@ -7,6 +7,7 @@ numbers, ``010`` is ten, ``1:30`` and ``2026-11-20`` are text. PyYAML alone foll
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -44,12 +45,19 @@ class YamlFile:
     """The file, as it was named."""
     lines: dict[KeyPath, int] = field(default_factory=dict)
     """Line (from 1) of every key and list item."""
+    origins: Mapping[str, YamlFile] = field(default_factory=dict)
+    """Where a top-level key's value was read from, if from another file."""
 
     def line(self, key: KeyPath) -> int:
         """Return the line of `key`, or of the innermost part of it that the file has."""
         while key and key not in self.lines:
             key = key[:-1]
         return self.lines.get(key, 1)
+
+    def at(self, key: KeyPath) -> str:
+        """Return where `key` stands, as ``FILE:LINE``."""
+        origin = self.origins.get(str(key[0])) if key else None
+        return origin.at(key) if origin is not None else f"{self.path}:{self.line(key)}"
 
     def get(self, key: KeyPath, default: Any = None) -> Any:
         """Return the value at `key`, or `default` where the file has none."""
@@ -63,7 +71,7 @@ class YamlFile:
     def error(self, key: KeyPath, message: str) -> ConfigError:
         """Make (not raise) the error ``FILE:LINE: key: message`` about the value at `key`."""
         about = f"{dotted(key)}: " if key else ""
-        return ConfigError(f"{self.path}:{self.line(key)}: {about}{one_line(message)}")
+        return ConfigError(f"{self.at(key)}: {about}{one_line(message)}")
 
 
 def load_yaml(path: str | Path) -> YamlFile:

@@ -92,7 +92,7 @@ def _make_integer(data: Any, place: KeyPath) -> None:
 def _combined(file: YamlFile, problems: list[Problem]) -> ConfigError:
     problems = sorted(problems, key=lambda p: (file.line(p.key), p.says))
     first, rest = problems[0], problems[1:]
-    text = f"{file.path}:{file.line(first.key)}: {first.says}"
+    text = f"{file.at(first.key)}: {first.says}"
     if rest:
         others = "; ".join(f"line {file.line(p.key)} {p.brief}" for p in rest[:3])
         text += f" (and {len(rest)} more: {others}{'; ...' if len(rest) > 3 else ''})"

@@ -299,3 +299,48 @@ def readable_rows(path: Path) -> int:
 def test_every_case_is_tried_on_every_command() -> None:
     counted = [c for _, _, _, commands in itertools.chain(WRONG_KEYS, REFERENCES) for c in commands]
     assert set(counted) == set(ALL)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("kind: sine\namplitude: 1e-5\nfreqency: 1", ["other.yaml:3: unknown key", "reference.frequency?"]),
+        (
+            "reference:\n  kind: sine\n  amplitude: 0\n  frequency: 1",
+            ["other.yaml:3: reference.amplitude is 0"],
+        ),
+        (
+            "reference: {kind: sine, amplitude: 1, frequency: 1}",
+            ["other.yaml:1: reference", "-0.001 to 0.001"],
+        ),
+    ],
+)
+def test_a_reference_from_another_file_is_wrong_there(folder: Path, text: str, says: list[str]) -> None:
+    (folder / "run.yaml").write_text(CONFIG)
+    (folder / "other.yaml").write_text(text + "\n")
+    refused(*arguments("simulate"), "--reference", "other.yaml", at=folder, says=says)
+
+
+@pytest.mark.parametrize(
+    ("command", "option", "says"),
+    [
+        ("identify", ["--seconds", "0"], ["--seconds", "range 0.1<=x"]),
+        ("simulate", ["--seconds", "nan"], ["--seconds", "'nan' is not a finite number"]),
+        ("simulate", ["--substeps", "0.1"], ["--substeps", "range 1<=x<=1000"]),
+        ("compensate", ["--seconds", "0.2"], ["compensate.settle", "0.5 s", "ends at 0.2 s"]),
+        ("identify", ["--clock", "vitual"], ["--clock", "'vitual'", "'virtual', 'wall'"]),
+        ("identify", ["--map", "position"], ["--map 'position'", "NAME=COLUMN"]),
+        ("replay", ["--rate", "inf"], ["'inf' is not a rate", "positive number of Hz"]),
+        ("replay", ["--bandwidth", "-1"], ["--bandwidth", "range x>0"]),
+    ],
+)
+def test_options_out_of_range(folder: Path, command: str, option: list[str], says: list[str]) -> None:
+    (folder / "run.yaml").write_text(CONFIG)
+    refused(*arguments(command), *option, at=folder, says=says)
+
+
+def test_places_that_cannot_be_written(folder: Path) -> None:
+    (folder / "run.yaml").write_text(CONFIG)
+    for out in ("/dev/null/out", "/proc/out"):
+        given = [out if word == "results" else word for word in arguments("simulate")]
+        refused(*given, at=folder, says=[f"{out} cannot be written"])
