@@ -29,6 +29,7 @@ COMMANDS = {
     "simulate": ("rtcomp.cli.simulate:simulate", "Simulate a stage, in closed loop or open, and record it."),
     "identify": ("rtcomp.cli.identify:identify", "Identify the friction's hysteresis while the stage moves."),
     "compensate": ("rtcomp.cli.compensate:compensate", "Follow a reference with the friction cancelled."),
+    "diagnose": ("rtcomp.cli.diagnose:diagnose", "Say which physics a stage leaves out of recordings."),
     "replay": ("rtcomp.cli.replay:replay", "Put a stage's force balance beside a recording, row by row."),
     "convert": ("rtcomp.cli.convert:convert", "Turn a recording into another format."),
     "drivers": ("rtcomp.cli.drivers:drivers", "List the installed drivers and their settings."),

@@ -49,12 +49,15 @@ def admit(stage: Stage, recordings: Sequence[Recording]) -> list[str]:
     for recording in recordings:
         _same_axis(stage, recording)
     _can_be_simulated(stage, recordings[0].rate_hz)
-    notes = [note for recording in recordings for note in _fits(stage, recording)]
+    notes = [_named(note, r, recordings) for r in recordings for note in _fits(stage, r)]
     notes += excitation.check(recordings)
-    for recording in recordings:
-        clipped = excitation.clipping(recording, stage.voltage_limit)
-        notes += [f"{recording.path}: {note}" for note in clipped]
+    for r in recordings:
+        notes += [_named(note, r, recordings) for note in excitation.clipping(r, stage.voltage_limit)]
     return notes + _rates(stage, recordings)
+
+
+def _named(note: str, recording: Recording, recordings: Sequence[Recording]) -> str:
+    return note if len(recordings) == 1 else f"in {recording.path.name}: {note}"
 
 
 def _alike(recordings: Sequence[Recording]) -> None:
@@ -223,8 +226,8 @@ def _units(stage: Stage, recording: Recording) -> list[str]:
             f"by {_percent(as_recorded)}, read so by {_percent(best)}; {reading.do}, or correct the stage"
         )
     return [
-        f"{recording.path}: the stage hardly describes this recording: its force balance is off by "
-        f"{_percent(as_recorded)} of the force"
+        f"the stage hardly describes this recording: its force balance is off by {_percent(as_recorded)} of "
+        "the force"
     ]
 
 

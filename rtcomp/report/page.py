@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rtcomp.report import palette
+from rtcomp.report.columns import Columns, render_columns
 from rtcomp.report.quantities import written
 from rtcomp.yamlfile import write_text
 
@@ -36,11 +37,12 @@ class Row(NamedTuple):
 
 
 class Section(NamedTuple):
-    """A heading, plain text (blank lines part paragraphs) and a figure, each optional but the heading."""
+    """A heading, plain text (blank lines part paragraphs), figure and table, all optional but the heading."""
 
     heading: str
     prose: str = ""
     figure: go.Figure | None = None
+    table: Columns | None = None
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,7 @@ class Page:
     notes: Sequence[str] = ()
     sections: Sequence[Section] = ()
     configuration: str = ""
+    configuration_is: str = "Configuration as run"
     versions: Mapping[str, Any] = field(default_factory=dict)
     tone: Literal["plain", "good", "poor"] = "plain"
 
@@ -179,8 +182,9 @@ def _sections(sections: Sequence[Section]) -> str:
                 f"{_if(notes, 'figcaption', 'caption')}</figure>\n"
             )
             number += 1
+        table = render_columns(section.table) if section.table is not None else ""
         parts.append(
-            f'<section id="s{index}">\n<h2>{_text(section.heading)}</h2>\n{prose}{drawing}</section>\n'
+            f'<section id="s{index}">\n<h2>{_text(section.heading)}</h2>\n{prose}{drawing}{table}</section>\n'
         )
     noscript = (
         "<noscript><p>The figures need JavaScript, which is in this file.</p></noscript>\n" if number else ""
@@ -192,7 +196,8 @@ def _foot(page: Page) -> str:
     configuration = versions = ""
     if page.configuration:
         inner = _text(page.configuration)
-        configuration = f"<details><summary>Configuration as run</summary>\n<pre>{inner}</pre></details>\n"
+        title = _text(page.configuration_is)
+        configuration = f"<details><summary>{title}</summary>\n<pre>{inner}</pre></details>\n"
     if page.versions:
         lines = "".join(
             f"<div><dt>{_text(k)}</dt><dd>{_text(v)}</dd></div>\n" for k, v in page.versions.items()
