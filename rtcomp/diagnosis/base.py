@@ -1,0 +1,85 @@
+"""The base of every explanation: the believed stage with its numbers refitted, within what is believable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtcomp.diagnosis.blocks import Bounds
+from rtcomp.diagnosis.ledger import Ledger, System, grid_of
+from rtcomp.diagnosis.motion import Motion
+from rtcomp.kernels import Floats
+from rtcomp.physics import Effect
+from rtcomp.stage.stage import Stage
+
+BELIEVED = 0.15
+"""How far off mass, viscous friction and micro-damping may be before that is a finding of its own."""
+SCALES = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.12, 1.25, 1.4, 1.6, 1.8)
+"""Factors tried on the reaches of the friction grid."""
+FIXED = 3
+"""Columns before those of friction: mass, viscous, micro-damping."""
+
+
+def bounds_of(stage: Stage, size: int, slack: float = BELIEVED, released: frozenset[str] = frozenset()) -> Bounds:
+    """Return the bounds of the base's coefficients.
+
+    Mass, viscous and micro-damping stay within `slack` of the belief unless `released`; friction elements are
+    springs, not negative, so that the virgin curve rises ever less steeply.
+    """
+    m = stage.mechanics
+    low, high = np.zeros(size), np.full(size, np.inf)
+    own = {"mass": stage.mass, "viscous": m.viscous, "micro_damping": m.micro_damping}
+    for i, (name, value) in enumerate(own.items()):
+        if name in released:
+            low[i] = 0.0 if name == "mass" else -np.inf
+        else:
+            low[i], high[i] = value * (1 - slack), value * (1 + slack)
+    return Bounds(low, high)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A ledger with the reaches that fit, its system, and the squared error of every block left out."""
+
+    ledger: Ledger
+    system: System
+    bounds: Bounds
+    errors: Floats
+    scale: float
+
+    @property
+    def coefficients(self) -> Floats:
+        """Coefficients of all columns, fitted on all that may be seen."""
+        return self.system.blocks.coefficients(self.ledger.seen, self.bounds)
+
+    @property
+    def residual(self) -> Floats:
+        """Force (N) on every kept row that the fit leaves: drive side less motion side."""
+        return np.asarray(self.system.y - self.system.columns @ self.coefficients)
+
+    @property
+    def hysteresis(self) -> Floats:
+        """Force (N) of the friction elements on every kept row."""
+        rows = slice(FIXED, FIXED + self.ledger.reaches.size)
+        return np.asarray(self.system.columns[:, rows] @ self.coefficients[rows])
+
+
+def fit_base(
+    stage: Stage,
+    motion: Motion,
+    effects: list[Effect] | None = None,
+    scales: tuple[float, ...] = SCALES,
+    released: frozenset[str] = frozenset(),
+) -> Fitted:
+    """Refit the believed stage, with `effects` at work, on the grid of reaches that predicts best."""
+    best: Fitted | None = None
+    for scale in scales:
+        ledger = Ledger(stage, motion, grid_of(stage, scale))
+        system = ledger.system(effects or [])
+        bounds = bounds_of(stage, system.columns.shape[1], released=released)
+        errors = system.blocks.left_out(ledger.seen, bounds)
+        if best is None or errors.sum() < best.errors.sum():
+            best = Fitted(ledger, system, bounds, errors, scale)
+    assert best is not None
+    return best

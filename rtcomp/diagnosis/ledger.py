@@ -1,0 +1,174 @@
+"""The ledger: drive force on one side, what the motion needed on the other, as a linear system.
+
+    drive(t) = m a + c v + micro(t) + sum_i k_i z_i(t) + extra columns
+
+`z_i` are unit stop elements on a grid of reaches around the believed ones, so that any virgin curve is in
+reach of the fit and a mistuned friction is not taken for missing physics. Effects are run by the kernels
+of the catalogue along the recorded motion: what changes friction changes the columns z_i, what adds a
+force adds a column, what changes the drive changes the left side, what changes the sensor changes the motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rtcomp.diagnosis.blocks import Blocks
+from rtcomp.diagnosis.motion import BLOCKS, UNSEEN, Motion, Strip
+from rtcomp.kernels import Floats, call_effect, compiled
+from rtcomp.physics import Effect, Place
+from rtcomp.physics.maxwell_slip import MaxwellSlip
+from rtcomp.physics.rows import new_rows
+from rtcomp.physics.wires import SENSED, STEP, TIME
+from rtcomp.stage.balance import forces
+from rtcomp.stage.stage import Stage
+
+MASS, VISCOUS, MICRO = "mass", "viscous", "micro_damping"
+GRID = 14
+"""Reaches of the grid where the believed friction is not a short list of elements."""
+
+
+@dataclass(frozen=True)
+class System:
+    """``y = A c`` on the kept rows, with the names of the columns."""
+
+    y: Floats
+    columns: Floats
+    names: tuple[str, ...]
+    blocks: Blocks
+
+
+@dataclass
+class Ledger:
+    """Builds systems for one stage and motion; remembers what does not change."""
+
+    stage: Stage
+    motion: Motion
+    reaches: Floats
+    known: list[Effect] = field(default_factory=list)
+    """Effects of the believed stage beside its base."""
+
+    def __post_init__(self) -> None:
+        self.block = self.motion.block()
+        self.seen = np.ones(BLOCKS, dtype=np.bool_)
+        self.seen[list(UNSEEN)] = False
+        self._plain: System | None = None
+
+    def system(self, effects: Sequence[Effect] = (), adders: Sequence[Effect] = ()) -> System:
+        """Return the system with `effects` at work, and one more column for each of `adders` (unit size)."""
+        effects = [*self.known, *effects]
+        if effects or self._plain is None:
+            made = self._make(effects)
+            if not effects:
+                self._plain = made
+        else:
+            made = self._plain
+        if not adders:
+            return made
+        more = np.column_stack([self.added(a, effects) for a in adders])
+        columns = np.column_stack([made.columns, more])
+        names = (*made.names, *(a.name for a in adders))
+        return System(made.y, columns, names, Blocks.of(columns, made.y, self.block, BLOCKS))
+
+    def extended(self, made: System, names: Sequence[str], more: Floats) -> System:
+        """Return `made` with further columns `more` (n, q)."""
+        columns = np.column_stack([made.columns, more])
+        return System(made.y, columns, (*made.names, *names), Blocks.of(columns, made.y, self.block, BLOCKS))
+
+    def added(self, effect: Effect, sensors: Sequence[Effect] = ()) -> Floats:
+        """Return the force (N, kept rows) that the motion needs for `effect` alone: a column."""
+        rows = []
+        for strip in self.motion.strips:
+            x, v, a = kinematics(strip, self.motion.period, sensors)
+            held = np.append(strip.voltage[:1], strip.voltage[:-1])
+            f = forces(self.stage, [effect], strip.time, x, v, a, strip.voltage)
+            g = forces(self.stage, [effect], strip.time, x, v, a, held) if effect.place is Place.DRIVE else f
+            rows.append(f.friction - f.push - 0.5 * (f.drive + g.drive))
+        return self.motion.smooth(rows)
+
+    def _make(self, effects: Sequence[Effect]) -> System:
+        drive = [e for e in effects if e.place is Place.DRIVE]
+        modifiers = [e for e in effects if e.place is Place.FRICTION]
+        others = [e for e in effects if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
+        speed = self.stage.mechanics.micro_damping_speed
+        sides, tables = [], []
+        for strip in self.motion.strips:
+            x, v, a = kinematics(strip, self.motion.period, effects)
+            given = self._given(strip, drive, x, v, a)
+            f = forces(self.stage, [*modifiers, *others], strip.time, x, v, a, strip.voltage)
+            sides.append(given + f.push - f.friction)
+            share = f.mass / self.stage.mass
+            columns = [a * share, v, v * np.exp(-((v / speed) ** 2))]
+            columns += [self._element(strip, modifiers, r, x, v, a) for r in self.reaches]
+            tables.append(np.column_stack(columns))
+        names = (MASS, VISCOUS, MICRO, *(f"reach {r:.3g}" for r in self.reaches))
+        y, table = self.motion.smooth(sides), self.motion.smooth(tables)
+        return System(y, table, names, Blocks.of(table, y, self.block, BLOCKS))
+
+    def _given(self, strip: Strip, drive: Sequence[Effect], x: Floats, v: Floats, a: Floats) -> Floats:
+        chain = sorted([*self._drive(), *drive], key=lambda e: e.order)
+        held = np.append(strip.voltage[:1], strip.voltage[:-1])
+        after = forces(self.stage, chain, strip.time, x, v, a, strip.voltage)
+        before = forces(self.stage, chain, strip.time, x, v, a, held)
+        return 0.5 * (before.drive + after.drive + before.push + after.push)
+
+    def _drive(self) -> list[Effect]:
+        chain = [e for e in self.stage.chain if e.place is Place.DRIVE]
+        return [e for e in chain if not any(e is k for k in self.known)]
+
+    def _element(
+        self, strip: Strip, modifiers: Sequence[Effect], reach: float, x: Floats, v: Floats, a: Floats
+    ) -> Floats:
+        chain = [*sorted(modifiers, key=lambda e: e.order), MaxwellSlip([(1.0, float(reach))])]
+        alone = forces(self.stage, chain, strip.time, x, v, a, strip.voltage).friction
+        if not modifiers:
+            return alone
+        return alone - forces(self.stage, chain[:-1], strip.time, x, v, a, strip.voltage).friction
+
+
+def kinematics(
+    strip: Strip, period: float, effects: Sequence[Effect] = ()
+) -> tuple[Floats, Floats, Floats]:
+    """Return true position, velocity and acceleration (SI) behind a strip, sensor effects undone."""
+    x = true_position(effects, strip.time, strip.position)
+    v, a = np.zeros_like(x), np.zeros_like(x)
+    v[1:-1] = (x[2:] - x[:-2]) / (2 * period)
+    a[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / period**2
+    return x, v, a
+
+
+def true_position(effects: Sequence[Effect], time: Floats, measured: Floats) -> Floats:
+    """Return the position (m) behind a measured one: the sensor effects undone, last first."""
+    sensors = sorted((e for e in effects if e.place is Place.SENSOR), key=lambda e: -e.order)
+    if not sensors:
+        return measured
+    rows = new_rows(measured.size)
+    rows[:, TIME], rows[:, SENSED] = time, measured
+    rows[:, STEP] = np.gradient(time)
+    for effect in sensors:
+        assert effect.inverse is not None, f"{effect.name} cannot be undone"
+        p, state = np.append(effect.vector(), 0.0), np.append(effect.initial_state(), 0.0)
+        _undo(effect.inverse.address, p, state, rows)
+    return np.ascontiguousarray(rows[:, SENSED])
+
+
+@compiled
+def _undo(address: int, p: Floats, state: Floats, rows: Floats) -> None:
+    for k in range(rows.shape[0]):
+        call_effect(address, p.ctypes.data, state.ctypes.data, rows[k].ctypes.data)
+
+
+def grid_of(stage: Stage, scale: float = 1.0) -> Floats:
+    """Return reaches (m) for the base: the believed ones, between and around them, times `scale`."""
+    friction = stage.friction
+    if isinstance(friction, MaxwellSlip) and len(friction.elements) <= 10:
+        own = np.unique([r for _, r in friction.elements])
+        between = np.sqrt(own[1:] * own[:-1])
+        return np.sort(np.concatenate([[0.6 * own[0]], own, between, [1.4 * own[-1]]])) * scale
+    if isinstance(friction, MaxwellSlip):
+        reach = [r for _, r in friction.elements]
+        return np.geomspace(0.7 * min(reach), 1.4 * max(reach), GRID) * scale
+    return np.geomspace(1e-7, 1e-4, GRID) * scale
+

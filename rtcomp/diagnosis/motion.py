@@ -1,0 +1,141 @@
+"""The recordings as a diagnosis sees them: one rate, a bandwidth, blocks, and some of them put aside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtcomp.kernels import Floats
+from rtcomp.recording.reader import Recording
+from rtcomp.stage.stage import Stage
+
+MOST_ROWS = 120_000
+"""Rows that a diagnosis works on; of longer recordings it takes windows, evenly spread."""
+WINDOWS = 8
+FASTEST_HZ = 2500.0
+"""Faster recordings are averaged down: mechanics above a kilohertz is not in the catalogue."""
+BLOCKS = 12
+UNSEEN = (4, 9)
+"""Blocks that neither fitting nor selection sees."""
+
+
+@dataclass(frozen=True)
+class Strip:
+    """One uninterrupted stretch of a recording at `rate`: time (s), position (m), voltage (V), reference."""
+
+    time: Floats
+    position: Floats
+    voltage: Floats
+    reference: Floats | None
+
+
+@dataclass(frozen=True)
+class Motion:
+    """All stretches with the bandwidth (Hz) they are compared in."""
+
+    strips: Sequence[Strip]
+    rate: float
+    cut: float
+
+    @property
+    def period(self) -> float:
+        """Time between rows (s)."""
+        return 1.0 / self.rate
+
+    @property
+    def thinning(self) -> int:
+        """Every how manieth row is kept after smoothing."""
+        return max(1, int(self.rate / (2.5 * self.cut)))
+
+    @property
+    def stroke(self) -> tuple[float, float]:
+        """Lowest and highest position (m)."""
+        return min(float(s.position.min()) for s in self.strips), max(float(s.position.max()) for s in self.strips)
+
+    @property
+    def seconds(self) -> float:
+        """Length of all stretches together (s)."""
+        return float(sum(s.time.size for s in self.strips)) / self.rate
+
+    def smooth(self, rows: Sequence[Floats]) -> Floats:
+        """Smooth an array a strip, (n_i,) or (n_i, p), below the cut, thin it, and join the strips."""
+        from scipy.signal import butter, sosfiltfilt
+
+        sections = butter(2, self.cut, fs=self.rate, output="sos")
+        edge, step = self.edge, self.thinning
+        return np.concatenate([sosfiltfilt(sections, r, axis=0)[edge : -edge or None : step] for r in rows])
+
+    @property
+    def edge(self) -> int:
+        """Rows left out at both ends of a strip, where smoothing has no neighbours."""
+        return int(self.rate / self.cut) + 2
+
+    def plain(self, rows: Sequence[Floats]) -> Floats:
+        """Thin and join without smoothing."""
+        return np.concatenate([r[self.edge : -self.edge or None : self.thinning] for r in rows])
+
+    def block(self) -> np.ndarray:
+        """Return the block number, 0 to BLOCKS - 1, of every kept row: equal stretches of motion."""
+        count = sum(len(s.time[self.edge : -self.edge or None : self.thinning]) for s in self.strips)
+        return np.arange(count) * BLOCKS // count
+
+
+def prepare(stage: Stage, recordings: Sequence[Recording], cut: float | None = None) -> Motion:
+    """Bring recordings of one rate to a workable size: windows of long ones, averages of fast ones."""
+    rate = recordings[0].rate_hz
+    strips = [s for r in recordings for s in _windows(r, MOST_ROWS // len(recordings), rate)]
+    factor = max(1, int(rate // FASTEST_HZ))
+    if factor > 1:
+        strips = [_averaged(s, factor) for s in strips]
+        rate /= factor
+    return Motion(strips, rate, cut or _bandwidth(stage, strips, rate))
+
+
+def _windows(recording: Recording, most: int, rate: float) -> list[Strip]:
+    most *= max(1, int(rate // FASTEST_HZ))
+    good = recording.trusted
+    position = np.interp(recording.time, recording.time[good], recording.position[good])
+    time = recording.time - recording.time[0]
+    whole = Strip(time, position, recording.voltage, recording.reference)
+    if time.size <= most:
+        return [whole]
+    length = most // WINDOWS
+    starts = np.linspace(0, time.size - length, WINDOWS).astype(int)
+    return [_part(whole, slice(s, s + length)) for s in starts]
+
+
+def _part(strip: Strip, rows: slice) -> Strip:
+    reference = None if strip.reference is None else strip.reference[rows]
+    return Strip(strip.time[rows], strip.position[rows], strip.voltage[rows], reference)
+
+
+def _averaged(strip: Strip, factor: int) -> Strip:
+    count = strip.time.size // factor
+
+    def mean(a: Floats) -> Floats:
+        return np.asarray(a[: count * factor].reshape(count, factor).mean(axis=1))
+
+    # Position at the middle of the averaged rows; commands held over them average to the same middle,
+    # half a short row later.
+    return Strip(
+        mean(strip.time),
+        mean(strip.position),
+        mean(strip.voltage),
+        None if strip.reference is None else mean(strip.reference),
+    )
+
+
+def _bandwidth(stage: Stage, strips: Sequence[Strip], rate: float) -> float:
+    """Return the bandwidth (Hz) up to which the noise of the acceleration stays small beside the force."""
+    noise = np.hypot(stage.sensor.noise, stage.sensor.resolution / np.sqrt(12.0))
+    force = stage.force_constant * float(np.sqrt(np.mean(np.concatenate([s.voltage for s in strips]) ** 2)))
+    most = min(0.15 * rate, 150.0)
+    if noise == 0.0 or force == 0.0:
+        return most
+    # rms of m a up to B, white position noise of this size at this rate: m (2 pi B)^2 noise sqrt(B / (2.5 rate))
+    cuts = np.geomspace(min(10.0, most), most, 60)
+    disturbed = stage.mass * (2 * np.pi * cuts) ** 2 * noise * np.sqrt(cuts / (2.5 * rate))
+    quiet = cuts[disturbed < 0.004 * force]
+    return float(quiet[-1]) if quiet.size else float(cuts[0])

@@ -1,0 +1,203 @@
+"""Refinement: the parameters of the named entries by nonlinear least squares, the base refitted with each try."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtcomp.diagnosis.base import Fitted, bounds_of
+from rtcomp.diagnosis.candidates import Entry, effect_of
+from rtcomp.diagnosis.ledger import Ledger, System
+from rtcomp.diagnosis.motion import Motion
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats
+from rtcomp.physics import Parameter, catalogue
+
+TRIES = 12
+"""Steps of Levenberg and Marquardt at the most."""
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One free parameter: which entry, its name, the step that derivatives are taken with, its range."""
+
+    entry: int
+    parameter: Parameter
+    step: float
+
+
+@dataclass(frozen=True)
+class Refined:
+    """Entries with refined parameters, the system they make, and what is left in blocks left out."""
+
+    entries: list[Entry]
+    fitted: Fitted
+    knobs: list[Knob]
+    jacobian: Floats
+    """(n_seen, q): change of the residual (N) with each knob, the base refitted."""
+    residual: Floats
+    """(n_seen,) N."""
+
+    @property
+    def errors(self) -> Floats:
+        """Squared error of every block left out, in units of the drive side as first believed."""
+        return self.fitted.errors
+
+
+def knobs_of(entries: Sequence[Entry], motion: Motion, which: Sequence[int] | None = None) -> list[Knob]:
+    """Return the free parameters of `entries` (of those numbered in `which`): all numbers that they state."""
+    low, high = motion.stroke
+    total = max(motion.seconds, 1.0)
+    found = []
+    for i, entry in enumerate(entries):
+        if which is not None and i not in which:
+            continue
+        for parameter in catalogue.entry(str(entry["name"])).parameters:
+            value = entry.get(parameter.name)
+            if not isinstance(value, int | float):
+                continue
+            size = abs(float(value))
+            step = 0.01 * size
+            if parameter.name == "period":
+                step = min(0.02 * size, 0.05 * size**2 / (high - low))
+            elif parameter.name == "phase":
+                step = 0.05
+            elif parameter.name == "frequency" and entry["name"] == "tonal-disturbance":
+                step = 0.03 / total
+            elif parameter.name == "position":
+                step = 0.002 * (high - low)
+            if step == 0.0:
+                continue
+            found.append(Knob(i, parameter, step))
+    return found
+
+
+def at(entries: Sequence[Entry], knobs: Sequence[Knob], moved: Floats) -> list[Entry]:
+    """Return the entries with every knob moved by so many of its steps, kept in range."""
+    out = [dict(e) for e in entries]
+    for knob, steps in zip(knobs, moved, strict=True):
+        p = knob.parameter
+        value = float(out[knob.entry][p.name]) + steps * knob.step  # type: ignore[arg-type]
+        before = float(out[knob.entry][p.name])  # type: ignore[arg-type]
+        if p.low >= 0.0 and p.name not in ("amplitude",):
+            value = max(value, 0.2 * before)  # sizes and times do not change sign
+        out[knob.entry][p.name] = float(np.clip(value, max(p.low, -1e300), min(p.high, 1e300)))
+    return out
+
+
+def evaluate(
+    base: Fitted, entries: Sequence[Entry], released: frozenset[str] = frozenset()
+) -> tuple[Fitted, Floats]:
+    """Return the base refitted with `entries` at work, and the residual (N) of the seen rows.
+
+    Errors are scaled to the drive side as believed, so that an entry which merely shrinks both sides gains
+    nothing.
+    """
+    ledger = base.ledger
+    system = ledger.system([effect_of(e) for e in entries])
+    return fitted_with(base, ledger, system, released)
+
+
+def fitted_with(
+    base: Fitted, ledger: Ledger, system: System, released: frozenset[str] = frozenset()
+) -> tuple[Fitted, Floats]:
+    """Fit `system` and return it with the residual (N) of the rows that may be seen, scaled alike."""
+    size = system.columns.shape[1]
+    bounds = bounds_of(ledger.stage, size, released=released)
+    scale = believed_power(ledger) / max(float(system.blocks.power[ledger.seen].sum()), 1e-300)
+    errors = system.blocks.left_out(ledger.seen, bounds) * scale
+    fitted = Fitted(ledger, system, bounds, errors, base.scale)
+    rows = ledger.seen[ledger.block]
+    residual = (system.y - system.columns @ fitted.coefficients)[rows] * np.sqrt(scale)
+    return fitted, residual
+
+
+def believed_power(ledger: Ledger) -> float:
+    """Return the squared drive force of the seen blocks as the stage believes it."""
+    return float(ledger.system().blocks.power[ledger.seen].sum())
+
+
+def refine(
+    base: Fitted,
+    motion: Motion,
+    entries: Sequence[Entry],
+    which: Sequence[int] | None = None,
+    tries: int = TRIES,
+    released: frozenset[str] = frozenset(),
+) -> Refined:
+    """Move the parameters of `entries` to where the residual is smallest.
+
+    Raises ConfigError where the entries as given cannot be evaluated.
+    """
+    current = [dict(e) for e in entries]
+    knobs = knobs_of(current, motion, which)
+    fitted, residual = evaluate(base, current, released)
+    damping = 1e-3
+    jacobian = np.zeros((residual.size, len(knobs)))
+    if not knobs:
+        return Refined(current, fitted, knobs, jacobian, residual)
+    for _ in range(tries):
+        for j in range(len(knobs)):
+            one = np.zeros(len(knobs))
+            one[j] = 1.0
+            try:
+                jacobian[:, j] = evaluate(base, at(current, knobs, one), released)[1] - residual
+            except ConfigError:
+                jacobian[:, j] = 0.0
+        gram, slope = jacobian.T @ jacobian, jacobian.T @ residual
+        before = float(residual @ residual)
+        improved = False
+        for _ in range(5):
+            diagonal = np.diag(gram) + 1e-12 * np.trace(gram) / len(knobs) + 1e-300
+            move = -np.linalg.solve(gram + damping * np.diag(diagonal), slope)
+            move = np.clip(move, -30.0, 30.0)
+            trial = at(current, knobs, move)
+            try:
+                tried, left = evaluate(base, trial, released)
+            except ConfigError:
+                damping *= 10.0
+                continue
+            if float(left @ left) < before:
+                improved = True
+                break
+            damping *= 10.0
+        if not improved:
+            break
+        gained = 1.0 - float(left @ left) / before
+        current, fitted, residual = trial, tried, left
+        knobs = knobs_of(current, motion, which)
+        damping = max(damping * 0.2, 1e-6)
+        if gained < 1e-4:
+            break
+    return Refined(current, fitted, knobs, jacobian, residual)
+
+
+def intervals(refined: Refined) -> dict[tuple[int, str], tuple[float, float]]:
+    """Return the 95 % interval of every knob, by entry number and name.
+
+    From the scatter of the blocks (a sandwich over blocks), so that a residual that is alike for long does
+    not count as many samples.
+    """
+    from scipy.stats import t as student
+
+    ledger = refined.fitted.ledger
+    block = ledger.block[ledger.seen[ledger.block]]
+    j, r = refined.jacobian, refined.residual
+    if not refined.knobs:
+        return {}
+    gram = j.T @ j
+    inverse = np.linalg.pinv(gram, rcond=1e-10)
+    blocks = np.unique(block)
+    scores = np.array([j[block == b].T @ r[block == b] for b in blocks])
+    count = blocks.size
+    meat = scores.T @ scores * count / max(count - 1, 1)
+    spread = np.sqrt(np.maximum(np.diag(inverse @ meat @ inverse), 0.0))
+    factor = float(student.ppf(0.975, max(count - 1, 1)))
+    found = {}
+    for knob, sd in zip(refined.knobs, spread, strict=True):
+        value = float(refined.entries[knob.entry][knob.parameter.name])  # type: ignore[arg-type]
+        half = factor * float(sd) * knob.step
+        found[knob.entry, knob.parameter.name] = (value - half, value + half)
+    return found

@@ -1,0 +1,64 @@
+"""Screening: what each search explains beside the base, on blocks left out of the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtcomp.diagnosis.base import Fitted
+from rtcomp.diagnosis.candidates import Column, Entry, Point, Scene, effect_of, searches
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats
+
+
+@dataclass(frozen=True)
+class Screened:
+    """The best starting point of one entry, with the squared error it leaves in every block left out."""
+
+    name: str
+    entry: Entry
+    errors: Floats
+
+    def gain(self, base: Floats) -> float:
+        """Return the part of the base's squared error that is gone."""
+        return 1.0 - float(self.errors.sum() / base.sum())
+
+
+def screen(
+    scene: Scene, effects: list[Entry], progress: Callable[[float], None] | None = None
+) -> list[Screened]:
+    """Try everything beside `effects`; return the best point of each name, the most explaining first."""
+    fitted = scene.fitted
+    ledger, seen = fitted.ledger, fitted.ledger.seen
+    # An entry that shrinks the drive side shrinks every error; all are stated for the believed drive.
+    power = float(fitted.system.blocks.power[seen].sum())
+    best: dict[str, Screened] = {}
+    others = [effect_of(e) for e in effects]
+    all_searches = list(searches(scene))
+    for number, search in enumerate(all_searches):
+        if isinstance(search, Column):
+            columns = search.columns()
+            more = np.column_stack(columns)
+            system = ledger.extended(fitted.system, [search.name] * len(columns), more)
+            bounds = fitted.bounds.with_free(len(columns))
+            errors = system.blocks.left_out(seen, bounds)
+            found = system.blocks.coefficients(seen, bounds)[-len(columns) :]
+            entry = search.compose(found)
+        else:
+            assert isinstance(search, Point)
+            entry = search.entry
+            try:
+                system = ledger.system([*others, effect_of(entry)])
+            except ConfigError:
+                continue
+            scale = power / max(float(system.blocks.power[seen].sum()), 1e-300)
+            errors = system.blocks.left_out(seen, fitted.bounds) * scale
+        if not np.isfinite(errors).all():
+            continue
+        if search.name not in best or errors.sum() < best[search.name].errors.sum():
+            best[search.name] = Screened(search.name, entry, errors)
+        if progress is not None:
+            progress((number + 1) / len(all_searches))
+    return sorted(best.values(), key=lambda b: float(b.errors.sum()))
