@@ -30,6 +30,9 @@ MOST_STEPS = 10_000
 """Integration steps a row, above which a simulation of minutes takes hours."""
 _EXCERPT = 60_000
 """Rows that mistaken units are looked for in."""
+_RUNAWAY = 1e6
+"""Times the travel of the free mass, above which a simulated position is not the axis's."""
+_HARDLY = 0.8
 _POOR, _CLOSED = 0.6, 0.45
 """Mismatch of the balance above which another reading is tried, and below which it is believed."""
 
@@ -129,13 +132,15 @@ def _can_be_simulated(stage: Stage, rate_hz: float) -> None:
             "done; check mass, friction and damping"
         )
     simulator = Simulator(stage)
+    free = 0.5 * stage.voltage_limit * stage.force_constant / stage.mass  # m, in one second
     ticks = max(8, min(200, int(100_000 / max(steps, 1.0))))
     for k in range(ticks):
         simulator.advance(0.5 * stage.voltage_limit * np.sin(2 * np.pi * k / ticks), 1.0 / rate_hz)
-        if not (np.isfinite(simulator.position) and np.isfinite(simulator.velocity)):
+        if not abs(simulator.position) < _RUNAWAY * free:
             raise ConfigError(
-                f"the stage cannot be simulated: its position is no number {k / rate_hz:.3g} s after the "
-                "start, under half of its voltage limit; check mass, stiffness and damping"
+                f"the stage cannot be simulated: its position is {simulator.position:.3g} m "
+                f"{(k + 1) / rate_hz:.3g} s after the start, under half of its voltage limit; check mass, "
+                "stiffness and damping"
             )
 
 
@@ -200,9 +205,10 @@ def _units(stage: Stage, recording: Recording) -> list[str]:
 
     def mismatch(x: Floats, u: Floats) -> float:
         balance = force_balance(stage, time, x, u)
-        sides = [float(np.sqrt(np.mean(f**2))) for f in (balance.force_drive, balance.force_motion)]
-        difference = float(np.sqrt(np.mean((balance.force_drive - balance.force_motion) ** 2)))
-        return difference / max(*sides, 1e-300) if np.isfinite(difference) else np.inf
+        # A weight or an offset that the stage does not know says nothing of units and signs.
+        drive, motion = float(np.std(balance.force_drive)), float(np.std(balance.force_motion))
+        difference = float(np.std(balance.force_drive - balance.force_motion))
+        return difference / max(drive, motion, 1e-300) if np.isfinite(difference) else np.inf
 
     as_recorded = mismatch(position, voltage)
     if as_recorded <= _POOR:
@@ -225,6 +231,8 @@ def _units(stage: Stage, recording: Recording) -> list[str]:
             f"{recording.path}: it looks as if {reading.looks}: as recorded the stage's force balance is off "
             f"by {_percent(as_recorded)}, read so by {_percent(best)}; {reading.do}, or correct the stage"
         )
+    if as_recorded < _HARDLY:
+        return []
     return [
         f"the stage hardly describes this recording: its force balance is off by {_percent(as_recorded)} of "
         "the force"
