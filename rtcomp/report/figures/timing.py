@@ -28,7 +28,7 @@ def _histogram(values: npt.ArrayLike, title: str, limit_us: float | None, limit_
     middle = quantiles[0]
     # A far tail squeezes everything else into one linear bin; then the axis is logarithmic.
     log_x = low >= 0.0 and middle > 0.0 and high > 30.0 * middle
-    shown = scale("us", middle) if log_x else scale("us", us, high)
+    shown = scale("us", np.sqrt(middle * high)) if log_x else scale("us", us, high)
     figure = c.canvas(c.titled(title, shown.unit), "Ticks", unified=False)
     figure.update_layout(showlegend=False, margin={"t": 80})
     floor = low
