@@ -95,3 +95,18 @@ def test_the_tracking_error_leaves_out_what_the_comparison_leaves_out(
     assert tracking.time_without[0] == tracking.time_with[0] == 1.0
     assert np.abs(tracking.without) == pytest.approx(np.full(3000, 1e-6))
     assert np.abs(tracking.compensated) == pytest.approx(np.full(3000, 1e-8))
+
+
+@pytest.mark.slow
+def test_without_folders_the_simulated_stage_is_run_first(pictures: ModuleType, tmp_path: Path) -> None:
+    pictures.main(["--out", str(tmp_path)])
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["compensation-dark.svg", "compensation.svg"]
+
+
+def test_one_folder_alone_is_refused(
+    pictures: ModuleType, run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        pictures.main([str(run)])
+    assert ended.value.code == 2
+    assert "give both folders, or none" in capsys.readouterr().err
