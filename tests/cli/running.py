@@ -25,6 +25,11 @@ def configuration(device: str | None = None, seconds: float = 30.0, judged: floa
     return f"{learned}\njudge:{rest.replace('duration: 1.5', f'duration: {judged}')}"
 
 
+def link(port: str) -> str:
+    """The device section for a plant on a machine that may be busy with anything: it is waited for."""
+    return f"{{driver: serial, port: {port}, connect_timeout: 10.0, watchdog: 10.0, max_missed: 20000}}"
+
+
 class Running:
     """`rtcomp` with the given arguments in the folder `at`; ended when the context ends."""
 

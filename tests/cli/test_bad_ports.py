@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 import pytest
 from command import listing, one_error_line, refused
-from running import Plant, Running, configuration
+from running import Plant, Running, configuration, link
 
 HOLDER = """
 import serial, sys
@@ -66,6 +66,10 @@ def arguments(command: str) -> list[str]:
 def use(folder: Path, port: str) -> None:
     device = f"{{driver: serial, port: {port}, connect_timeout: 0.4}}"
     (folder / "run.yaml").write_text(configuration(device))
+
+
+def use_plant(folder: Path, plant: Plant) -> None:
+    (folder / "run.yaml").write_text(configuration(link(plant.port)))
 
 
 COMMANDS = pytest.mark.parametrize("command", ["identify", "compensate"])
@@ -122,7 +126,7 @@ def test_a_port_that_belongs_to_something_else(folder: Path, command: str) -> No
 
 def test_a_plant_with_another_axis(folder: Path) -> None:
     with Plant(folder) as plant:
-        use(folder, plant.port)
+        use_plant(folder, plant)
         text = (folder / "run.yaml").read_text()
         (folder / "run.yaml").write_text(text.replace("stage:\n", "stage:\n  axis: rotary\n"))
         refused(*arguments("identify"), at=folder, says=[plant.port, "axis is linear, the stage's is rotary"])
@@ -138,7 +142,7 @@ def test_a_plant_that_dies_while_running(folder: Path, command: str, force: bool
     name = "recording.h5" if command == "identify" else "without.h5"
     before = listing(folder / "results")
     with Plant(folder) as plant:
-        use(folder, plant.port)
+        use_plant(folder, plant)
         with Running(*given, at=folder) as run:
             work = f"results.new-{run.process.pid}" if force else "new"
             run.wait_for_rows(f"{work}/{name}", 300)

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 from command import listing, rtcomp
-from running import Plant, Running, configuration
+from running import Plant, Running, configuration, link
 
 from rtcomp.hysteresis.model import HysteresisModel
 
@@ -67,7 +67,7 @@ def test_identify_on_the_wall_clock_keeps_what_it_learned(tmp_path: Path, number
 @SIGNALS
 def test_identify_over_the_link_ends_at_zero_volts(tmp_path: Path, number: int) -> None:
     with Plant(tmp_path) as plant:
-        (tmp_path / "run.yaml").write_text(configuration(f"{{driver: serial, port: {plant.port}}}"))
+        (tmp_path / "run.yaml").write_text(configuration(link(plant.port)))
         with Running("identify", "run.yaml", "--out", "out", "--json", at=tmp_path) as run:
             stop(run, "out/recording.h5", number)
         log = plant.stop()
@@ -109,7 +109,7 @@ def test_an_earlier_runs_results_are_not_given_up_for_half_a_run(tmp_path: Path,
 def test_compensate_over_the_link_does_not_begin_its_second_run(tmp_path: Path, number: int) -> None:
     (tmp_path / "model.yaml").write_text("model: interval\nwidths: [2.0e-5, 4.0e-5]\nweights: [1e5, 5e4]\n")
     with Plant(tmp_path) as plant:
-        (tmp_path / "run.yaml").write_text(configuration(f"{{driver: serial, port: {plant.port}}}"))
+        (tmp_path / "run.yaml").write_text(configuration(link(plant.port)))
         given = ["compensate", "run.yaml", "--model", "model.yaml", "--out", "out", "--json"]
         with Running(*given, at=tmp_path) as run:
             ended = stop(run, "out/without.h5", number)
