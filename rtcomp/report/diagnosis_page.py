@@ -127,7 +127,7 @@ def _gain(found: Diagnosis) -> Section:
     if len({fit.before, fit.retuned, fit.after}) > 1:
         prose += " Measured on parts of the recordings that neither fitting nor selection saw."
     errors = {"as believed": fit.before, "retuned": fit.retuned, "extended": fit.after}
-    return Section("How much better it predicts", prose, fit_figure(errors, fit.floor))
+    return Section("How well it predicts", prose, fit_figure(errors, fit.floor))
 
 
 def _named(effect: Named, force: str) -> Section:

@@ -95,8 +95,11 @@ def missing(rows: int = 30_000) -> Diagnosis:
 
 def consistent() -> Diagnosis:
     """Nothing missing."""
+    whole = missing(2000)
     return replace(
-        missing(2000), verdict="consistent", where=[], retuned=[], effects=[], next_experiment=None,
+        whole, verdict="consistent", where=[], retuned=[], effects=[], next_experiment=None,
+        residual_before=whole.residual_after,
+        candidates=[replace(k, gain=0.002 * k.gain, z=0.02 * k.z) for k in whole.candidates],
         fit=Fit(0.0082, 0.0082, 0.0082, 0.0081), notes=[],
         stage=Stage.from_dict({**STAGE, "stage": {**STAGE["stage"], "effects": []}}),  # type: ignore[dict-item]
     )  # fmt: skip

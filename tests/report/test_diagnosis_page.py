@@ -8,6 +8,7 @@ import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import made_up
 import numpy as np
@@ -225,6 +226,23 @@ def test_a_table_is_as_wide_as_its_head_and_escapes_its_cells() -> None:
     assert "&lt;i&gt;" in html and '<tr class="muted">' in html and 'data-label="b"' in html
     with pytest.raises(ValueError, match="row 0 of the table has 1 cells, its head 2"):
         render_columns(Columns(("a", "b"), [("1",)]))
+
+
+def test_every_key_of_the_answer_stands_in_the_formats() -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
+    text = page[page.index("\n## A diagnosis\n") : page.index("\n## The command line\n")]
+    known = set(re.findall(r"[\w-]+", " ".join(re.findall(r"`([^`\n]+)`", text))))
+
+    def keys(value: Any) -> set[str]:
+        if isinstance(value, list):
+            return set().union(*map(keys, value))
+        return set(value).union(*map(keys, value.values())) if isinstance(value, dict) else set()
+
+    answer = made_up.missing(500).to_json()
+    for effect in answer["effects"]:
+        effect["parameters"] = list(effect["parameters"].values())  # their names are the catalogue's
+    assert keys(answer) - known == set()
+    assert {"consistent", "retuned", "missing-physics", "unexplained"} <= known
 
 
 @pytest.mark.slow
