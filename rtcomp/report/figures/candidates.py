@@ -75,7 +75,8 @@ def fit_figure(errors: Mapping[str, float], floor: float) -> go.Figure:
         line={"color": palette.INK, "width": 1, "dash": "dash"},
     )  # fmt: skip
     figure.add_annotation(
-        xanchor="left" if 200 * floor < largest else "right", x=100 * floor, yref="paper", y=1, yanchor="bottom", showarrow=False,
+        xanchor="left" if 200 * floor < largest else "right",
+        x=100 * floor, yref="paper", y=1, yanchor="bottom", showarrow=False,
         text=f"noise alone: {si(100 * floor, '%')}", font={"color": palette.INK, "size": 12},
     )  # fmt: skip
     figure.update_xaxes(range=[0, max(1.15 * largest, 1e-9)])
