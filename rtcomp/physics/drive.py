@@ -4,7 +4,7 @@ Orders, lowest first. Up to `drive-force` effects work on the voltage (VOLTS) or
 after it, on forces::
 
     10  drive-offset       VOLTS + offset
-    20  (dead time)
+    20  drive-delay        VOLTS of a while ago (see `delay`)
     30  drive-deadband     VOLTS shrunk by the width
     40  drive-saturation   VOLTS held within +-limit
     50  drive-lag          VOLTS through a first-order lag
@@ -169,7 +169,7 @@ class DriveSaturation(Effect):
     source = "Tao, Kokotovic (1996), Adaptive Control of Systems with Actuator and Sensor Nonlinearities"
     signature = "residual force only at the largest commands, with their sign, growing with what is cut off"
     experiment = "fast accelerations that ask for the full voltage"
-    example = {"limit": 5.0}
+    example = {"limit": 0.9}
     neutral = {"limit": 1e6}
     order = 40
 

@@ -9,10 +9,28 @@ The chain, run for every integration step, in this order::
     drive        volts -> DRIVE force            (reads VOLTS, changes VOLTS, DRIVE, GAIN)
     disturbance  forces from outside             (adds to PUSH)
     mechanics    springs, weight, contact, mass  (adds to PUSH, changes MASS)
-    friction     modifiers (change REACH, SCALE), then models and speed laws (add to FRICTION)
+    friction     modifiers, then models and speed laws (see below)
     sensor       true to measured position       (changes SENSED; once a tick, not a step)
 
-Within a place, effects run by `order`, lowest first.
+Within a place, effects run by `order`, lowest first. The drive's orders stand in `drive`, the sensor's in
+`sensor`; mechanics: mass (10), then what adds forces (50), then second masses, which take from MASS what is
+left (60 resonance; 70 backlash, after which MOVED and VELOCITY are the load's). Friction::
+
+     5  frictional-lag                  sets LATE
+    10  asymmetric-viscous-friction     sets SKEW
+    20  stribeck                        REACH  (the yield level at equal stiffness)
+        load-dependent-friction         REACH
+        stiction-ageing                 REACH
+        position-dependent-friction     SCALE  (the whole force)
+        friction-drift                  SCALE
+    30  creep                           MOVED less what the contacts creep
+    40  asymmetric-friction             MOVED larger forward than backward
+    50  models and speed laws           add to FRICTION; a model leaves GRIP, GRIP_LEVEL, GRIP_STIFFNESS
+    80  non-congruent-friction          bends GRIP and exchanges it in FRICTION
+   100  (end of backlash)               FRICTION acts on the load behind the play: BEHIND
+
+What modifies friction acts on every model of the catalogue through these wires: displacement reaches a model
+by MOVED only, speed by VELOCITY less LATE, its level by REACH, its size by SCALE.
 
 To feed an effect forward, there are two ways, and its place says which:
 
@@ -27,6 +45,7 @@ To feed an effect forward, there are two ways, and its place says which:
 from __future__ import annotations
 
 import enum
+import math
 import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -145,6 +164,22 @@ class Effect:
     def damping(self) -> float:
         """Largest damping (N s/m) it can put on the mass; bounds the integration step."""
         return 0.0
+
+    def frequency(self) -> float:
+        """Largest angular frequency (rad/s) it gives to any mass it stands on; bounds the integration step.
+
+        For what brings a mass or stiffness in proportion to the stage's own: at a moving mass m it puts no
+        more than m frequency()^2 of stiffness and m frequency() of damping on it.
+        """
+        return 0.0
+
+    def longest_step(self) -> float:
+        """Longest step (s) its kernel bears; rows of a recording are cut into such."""
+        return math.inf
+
+    def companions(self) -> list[Effect]:
+        """Effects that it needs elsewhere in the chain and that no stage lists."""
+        return []
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entry as a stage file's ``effects`` lists it."""

@@ -12,14 +12,24 @@ from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Parameter, Place
-from rtcomp.physics.level import LEVEL, VISCOUS, speed_midway, stribeck_level
+from rtcomp.physics.level import LEVEL, VISCOUS, speed_midway, stribeck_level, viscous_speed
 from rtcomp.physics.lists import ListEffect
-from rtcomp.physics.wires import FRICTION, MOVED, REACH, SCALE, STEP, VELOCITY
+from rtcomp.physics.wires import (
+    FRICTION,
+    GRIP,
+    GRIP_LEVEL,
+    GRIP_STIFFNESS,
+    MOVED,
+    REACH,
+    SCALE,
+    STEP,
+)  # fmt: skip
 
 
 @effect_kernel
 def gms(p: Floats, s: Floats, w: Floats) -> None:
-    """p: coulomb, static, Stribeck velocity, exponent, attraction, viscous, count, stiffness and weight each.
+    """p: coulomb, static, Stribeck velocity, exponent, attraction, viscous, count, stiffness and weight each,
+    then the whole stiffness.
 
     s: force (N) of each element, then the direction in which each slips (0 while it sticks). At constant
     speed both laws have closed forms: the step is sticking up to the yield point, then slipping for the rest.
@@ -27,11 +37,12 @@ def gms(p: Floats, s: Floats, w: Floats) -> None:
     moved = w[MOVED]
     count = int(p[6])
     force = 0.0
+    nominal = stribeck_level(p[0], p[1], p[2], p[3], speed_midway(w))
     if moved == 0.0:  # at rest there is no direction: elements keep what they have
         for i in range(count):
             force += s[i]
     else:
-        level = stribeck_level(p[0], p[1], p[2], p[3], speed_midway(w)) * w[REACH]
+        level = nominal * w[REACH]
         direction = math.copysign(1.0, moved)
         relax = p[4] * w[STEP] / level
         for i in range(count):
@@ -54,7 +65,10 @@ def gms(p: Floats, s: Floats, w: Floats) -> None:
                 along = yielding + (along - yielding) * math.exp(-relax * slipping)
             s[i] = along * direction
             force += s[i]
-    w[FRICTION] += force * w[SCALE] + p[5] * w[VELOCITY]
+    w[GRIP] = force * w[SCALE]
+    w[GRIP_LEVEL] = nominal
+    w[GRIP_STIFFNESS] = p[7 + 2 * count]
+    w[FRICTION] += w[GRIP] + p[5] * viscous_speed(w)
 
 
 @register
@@ -94,6 +108,10 @@ class GeneralisedMaxwellSlip(ListEffect):
             raise ConfigError(
                 f"gms: the weights of its elements sum to {total:g}; they must sum to 1 (within 1e-6)"
             )
+
+    def vector(self) -> Floats:
+        """Return the plain parameters, count, elements and the stiffness with every element sticking."""
+        return np.append(super().vector(), self.stiffness())
 
     def initial_state(self) -> Floats:
         """Return forces and slip directions, all relaxed and sticking."""

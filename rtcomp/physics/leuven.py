@@ -30,10 +30,20 @@ from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.approach import SHARPNESS, STEPS, advance, flow, longest
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Parameter, Place
-from rtcomp.physics.level import LEVEL, VISCOUS, speed_midway, stribeck_level
+from rtcomp.physics.level import LEVEL, VISCOUS, speed_midway, stribeck_level, viscous_speed
 from rtcomp.physics.lists import ListEffect
 from rtcomp.physics.modified_leuven import DAMPING
-from rtcomp.physics.wires import FRICTION, MOVED, REACH, SCALE, VELOCITY
+from rtcomp.physics.wires import (
+    FRICTION,
+    GRIP,
+    GRIP_LEVEL,
+    GRIP_STIFFNESS,
+    LATE,
+    MOVED,
+    REACH,
+    SCALE,
+    VELOCITY,
+)  # fmt: skip
 
 DEPTH: Final = 32
 """Reversals that the memory holds."""
@@ -53,7 +63,8 @@ def leuven(p: Floats, s: Floats, w: Floats) -> None:
     """
     v = w[VELOCITY]
     n = p[4]
-    level = stribeck_level(p[0], p[1], p[2], p[3], speed_midway(w)) * w[REACH]
+    nominal = stribeck_level(p[0], p[1], p[2], p[3], speed_midway(w))
+    level = nominal * w[REACH]
     cut = longest(n)
     left = abs(w[MOVED])
     if left > 0.0:
@@ -110,10 +121,13 @@ def leuven(p: Floats, s: Floats, w: Floats) -> None:
     if v * s[_DIRECTION] > 0.0:  # against the last motion a new curve would begin, with dz/dt = v
         held = int(s[_HELD])
         start = s[_DIRECTION] * s[_STACK + held - 1] if held > 0 else 0.0
-        span = stribeck_level(p[0], p[1], p[2], p[3], v) * w[REACH] - start
+        span = stribeck_level(p[0], p[1], p[2], p[3], v - w[LATE]) * w[REACH] - start
         done = s[_DIRECTION] * s[_FORCE] - start
         rate = v * flow(done / span, n) if span > 0.0 else 0.0
-    w[FRICTION] += (s[_FORCE] + p[5] * rate) * w[SCALE] + p[6] * v
+    w[GRIP] = s[_FORCE] * w[SCALE]
+    w[GRIP_LEVEL] = nominal
+    w[GRIP_STIFFNESS] = p[_COUNT + 2]
+    w[FRICTION] += w[GRIP] + p[5] * rate * w[SCALE] + p[6] * viscous_speed(w)
 
 
 @register

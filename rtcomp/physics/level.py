@@ -6,7 +6,7 @@ import math
 
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics.effect import Parameter
-from rtcomp.physics.wires import ACCELERATION, STEP, VELOCITY
+from rtcomp.physics.wires import ACCELERATION, LATE, SKEW, STEP, VELOCITY
 
 COULOMB = Parameter("coulomb", "N", 0.0, 1e6, "friction of fast sliding, without viscous part", open_low=True)
 STATIC = Parameter("static", "N", 0.0, 1e6, "friction at the limit of low speed", open_low=True)
@@ -36,4 +36,11 @@ def speed_midway(w: Floats) -> float:
     A step's displacement is made under the level of its middle: with that of its end, friction would run
     ahead of the motion by half a step, first-order in it, and stick-slip lives on the difference.
     """
-    return float(w[VELOCITY] - 0.5 * w[STEP] * w[ACCELERATION])
+    return float(w[VELOCITY] - w[LATE] - 0.5 * w[STEP] * w[ACCELERATION])
+
+
+@compiled
+def viscous_speed(w: Floats) -> float:
+    """Return the velocity (m/s) as viscous friction takes it: late, and weighted by direction."""
+    v = w[VELOCITY] - w[LATE]
+    return float(v + w[SKEW] * abs(v))

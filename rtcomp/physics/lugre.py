@@ -7,8 +7,18 @@ import math
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.level import LEVEL, VISCOUS, speed_midway, stribeck_level
-from rtcomp.physics.wires import FRICTION, MOVED, REACH, SCALE, VELOCITY
+from rtcomp.physics.level import LEVEL, VISCOUS, speed_midway, stribeck_level, viscous_speed
+from rtcomp.physics.wires import (
+    FRICTION,
+    GRIP,
+    GRIP_LEVEL,
+    GRIP_STIFFNESS,
+    LATE,
+    MOVED,
+    REACH,
+    SCALE,
+    VELOCITY,
+)  # fmt: skip
 
 
 @effect_kernel
@@ -16,12 +26,15 @@ def lugre(p: Floats, s: Floats, w: Floats) -> None:
     """p: stiffness, damping, coulomb, static, Stribeck velocity, exponent, viscous; s: deflection z (m)."""
     v = w[VELOCITY]
     moved = w[MOVED]
-    level = stribeck_level(p[2], p[3], p[4], p[5], speed_midway(w)) * w[REACH]
-    settled = level / p[0]
+    level = stribeck_level(p[2], p[3], p[4], p[5], speed_midway(w))
+    settled = level * w[REACH] / p[0]
     # The solution at constant speed depends on the displacement only: exact for a step of any size.
     s[0] += (math.copysign(settled, moved) - s[0]) * -math.expm1(-abs(moved) / settled)
-    rate = v - abs(v) * s[0] * p[0] / (stribeck_level(p[2], p[3], p[4], p[5], v) * w[REACH])
-    w[FRICTION] += (p[0] * s[0] + p[1] * rate) * w[SCALE] + p[6] * v
+    rate = v - abs(v) * s[0] * p[0] / (stribeck_level(p[2], p[3], p[4], p[5], v - w[LATE]) * w[REACH])
+    w[GRIP] = p[0] * s[0] * w[SCALE]
+    w[GRIP_LEVEL] = level
+    w[GRIP_STIFFNESS] = p[0]
+    w[FRICTION] += w[GRIP] + p[1] * rate * w[SCALE] + p[6] * viscous_speed(w)
 
 
 @register

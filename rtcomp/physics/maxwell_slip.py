@@ -8,7 +8,7 @@ from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Parameter, Place
 from rtcomp.physics.lists import ListEffect
-from rtcomp.physics.wires import FRICTION, MOVED, REACH, SCALE
+from rtcomp.physics.wires import FRICTION, GRIP, GRIP_LEVEL, GRIP_STIFFNESS, MOVED, REACH, SCALE
 
 STIFFNESS = Parameter("stiffness", "N/m", -1e12, 1e12, "spring of the element")
 REACH_M = Parameter("reach", "m", 0.0, 1e3, "travel at which the element yields", open_low=True)
@@ -16,15 +16,19 @@ REACH_M = Parameter("reach", "m", 0.0, 1e3, "travel at which the element yields"
 
 @effect_kernel
 def maxwell_slip(p: Floats, s: Floats, w: Floats) -> None:
-    """p: count, then stiffness and reach of each element; s: deflection (m) of each element."""
+    """p: count, stiffness and reach of each element, level, whole stiffness; s: deflection (m) of each."""
     force = 0.0
-    for i in range(int(p[0])):
+    count = int(p[0])
+    for i in range(count):
         reach = p[2 + 2 * i] * w[REACH]
         deflection = s[i] + w[MOVED]  # exact over a displacement, however large
         deflection = min(max(deflection, -reach), reach)
         s[i] = deflection
         force += p[1 + 2 * i] * deflection
-    w[FRICTION] += force * w[SCALE]
+    w[GRIP] = force * w[SCALE]
+    w[GRIP_LEVEL] = p[1 + 2 * count]
+    w[GRIP_STIFFNESS] = p[2 + 2 * count]
+    w[FRICTION] += w[GRIP]
 
 
 @register
@@ -44,6 +48,10 @@ class MaxwellSlip(ListEffect):
     )
     experiment = "nested reversals of decreasing size inside the presliding range"
     example = {"elements": [{"stiffness": 8e5, "reach": 2e-6}, {"stiffness": 4e5, "reach": 7e-6}]}
+
+    def vector(self) -> Floats:
+        """Return count, elements, level (N) and the stiffness with every element sticking (N/m)."""
+        return np.append(super().vector(), [self.level, sum(k for k, _ in self.elements)])
 
     def initial_state(self) -> Floats:
         """Return the elements' deflections, all relaxed."""

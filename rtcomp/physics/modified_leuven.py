@@ -13,16 +13,27 @@ from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.approach import SHARPNESS, STEPS, advance, flow, longest
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Parameter, Place
-from rtcomp.physics.level import LEVEL, VISCOUS, speed_midway, stribeck_level
+from rtcomp.physics.level import LEVEL, VISCOUS, speed_midway, stribeck_level, viscous_speed
 from rtcomp.physics.lists import ListEffect
-from rtcomp.physics.wires import FRICTION, MOVED, REACH, SCALE, VELOCITY
+from rtcomp.physics.wires import (
+    FRICTION,
+    GRIP,
+    GRIP_LEVEL,
+    GRIP_STIFFNESS,
+    LATE,
+    MOVED,
+    REACH,
+    SCALE,
+    VELOCITY,
+)  # fmt: skip
 
 DAMPING = Parameter("damping", "N s/m", 0.0, 1e8, "damping sigma_1 of the presliding state", 0.0)
 
 
 @effect_kernel
 def modified_leuven(p: Floats, s: Floats, w: Floats) -> None:
-    """p: coulomb, static, Stribeck velocity, exponent, sharpness, damping, viscous, count, then elements.
+    """p: coulomb, static, Stribeck velocity, exponent, sharpness, damping, viscous, count, then elements,
+    then the whole stiffness.
 
     Elements are stiffness and reach each; s: deflection (m) of each. Within a step the motion is cut where
     the force would change by more than a tenth of the level, so a long step is as right as many short ones.
@@ -31,7 +42,8 @@ def modified_leuven(p: Floats, s: Floats, w: Floats) -> None:
     n = p[4]
     count = int(p[7])
     widen = w[REACH]
-    level = stribeck_level(p[0], p[1], p[2], p[3], speed_midway(w)) * widen
+    nominal = stribeck_level(p[0], p[1], p[2], p[3], speed_midway(w))
+    level = nominal * widen
     cut = longest(n)
     left = abs(w[MOVED])
     direction = math.copysign(1.0, w[MOVED])
@@ -70,9 +82,12 @@ def modified_leuven(p: Floats, s: Floats, w: Floats) -> None:
         reach = p[9 + 2 * i] * widen
         s[i] = min(max(s[i], -reach), reach)
         force += p[8 + 2 * i] * s[i]
-    level = stribeck_level(p[0], p[1], p[2], p[3], v) * widen
+    level = stribeck_level(p[0], p[1], p[2], p[3], v - w[LATE]) * widen
     rate = v * flow(math.copysign(1.0, v) * force / level, n)
-    w[FRICTION] += (force + p[5] * rate) * w[SCALE] + p[6] * v
+    w[GRIP] = force * w[SCALE]
+    w[GRIP_LEVEL] = nominal
+    w[GRIP_STIFFNESS] = p[8 + 2 * count]
+    w[FRICTION] += w[GRIP] + p[5] * rate * w[SCALE] + p[6] * viscous_speed(w)
 
 
 @register
@@ -110,6 +125,10 @@ class ModifiedLeuven(ListEffect):
                 f"modified-leuven: its elements yield at {bank:g} N, below the level of {highest:g} N; "
                 f"sum of stiffness * reach must be at least {highest:g} N"
             )
+
+    def vector(self) -> Floats:
+        """Return the plain parameters, count, elements and the stiffness with every element sticking."""
+        return np.append(super().vector(), sum(k for k, _ in self.elements))
 
     def initial_state(self) -> Floats:
         """Return the elements' deflections, all relaxed."""

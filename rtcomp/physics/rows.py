@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from rtcomp.kernels import Floats, call_effect, compiled
+from rtcomp.kernels import Floats, compiled
 from rtcomp.physics.effect import Effect
+from rtcomp.physics.program import Program, run_chain
 from rtcomp.physics.wires import (
+    BEHIND,
     COUNT,
     GAIN,
+    GRIP,
     MASS,
     MOVED,
     POSITION,
@@ -26,15 +28,11 @@ from rtcomp.physics.wires import (
 
 
 @compiled
-def _over_rows(
-    addresses: npt.NDArray[np.intp], parts: npt.NDArray[np.intp], p: Floats, s: Floats, rows: Floats
-) -> None:
+def _over_rows(steps: np.ndarray, p: Floats, s: Floats, rows: Floats) -> None:
     for k in range(rows.shape[0]):
-        w = rows[k]
-        for i in range(addresses.shape[0]):
-            call_effect(
-                addresses[i], p[parts[i, 0] :].ctypes.data, s[parts[i, 1] :].ctypes.data, w.ctypes.data
-            )
+        if k > 0:  # what stays from step to step
+            rows[k, GRIP : BEHIND + 1] = rows[k - 1, GRIP : BEHIND + 1]
+        run_chain(steps, p, s, rows[k], 0, steps[0])
 
 
 def over_rows(chain: Sequence[Effect], rows: Floats) -> Floats:
@@ -46,13 +44,8 @@ def over_rows(chain: Sequence[Effect], rows: Floats) -> Floats:
     """
     if rows.dtype != np.float64 or not rows.flags.c_contiguous or rows.ndim != 2 or rows.shape[1] != COUNT:
         raise TypeError(f"rows must be a C-ordered float64 array of shape (n, {COUNT}); it is {rows.shape}")
-    vectors = [effect.vector() for effect in chain]
-    states = [effect.initial_state() for effect in chain]
-    starts = [np.cumsum([0] + [len(a) for a in arrays])[:-1] for arrays in (vectors, states)]
-    # One spare number each, so that an effect without parameters or state still has an address.
-    p, s = (np.concatenate([*arrays, [0.0]]) for arrays in (vectors, states))
-    addresses = np.array([effect.kernel.address for effect in chain], dtype=np.intp)
-    _over_rows(addresses, np.ascontiguousarray(np.transpose(starts), dtype=np.intp), p, s, rows)
+    program = Program(chain)
+    _over_rows(program.steps, program.p, program.s, rows)
     return rows
 
 

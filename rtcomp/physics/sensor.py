@@ -2,8 +2,11 @@
 
 Orders, lowest first::
 
+    10  sensor-delay           SENSED of a while ago (see `delay`)
     20  sensor-scale           SENSED over scale
     30  sensor-periodic-error  SENSED plus a sine of itself
+    40  sensor-drift           SENSED plus a slow change
+    50  sensor-jump            SENSED plus a jump
     60  sensor-noise           SENSED plus a random number
     80  sensor-resolution      SENSED to the nearest count
 """
@@ -16,7 +19,7 @@ from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.drive import PERIOD, PHASE
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.wires import NOISE, SENSED
+from rtcomp.physics.wires import NOISE, SENSED, TIME
 
 
 @effect_kernel
@@ -52,6 +55,32 @@ def sensor_periodic_error_inverse(p: Floats, s: Floats, w: Floats) -> None:
         if abs(change) < 1e-15 * p[1]:
             break
     w[SENSED] = x
+
+
+@effect_kernel
+def sensor_drift(p: Floats, s: Floats, w: Floats) -> None:
+    """p: drift (m), time constant (s)."""
+    w[SENSED] += p[0] * -math.expm1(-w[TIME] / p[1])
+
+
+@effect_kernel
+def sensor_drift_inverse(p: Floats, s: Floats, w: Floats) -> None:
+    """p: drift (m), time constant (s)."""
+    w[SENSED] -= p[0] * -math.expm1(-w[TIME] / p[1])
+
+
+@effect_kernel
+def sensor_jump(p: Floats, s: Floats, w: Floats) -> None:
+    """p: size (m), time (s)."""
+    if w[TIME] >= p[1]:
+        w[SENSED] += p[0]
+
+
+@effect_kernel
+def sensor_jump_inverse(p: Floats, s: Floats, w: Floats) -> None:
+    """p: size (m), time (s)."""
+    if w[TIME] >= p[1]:
+        w[SENSED] -= p[0]
 
 
 @effect_kernel
@@ -109,6 +138,50 @@ class SensorPeriodicError(Effect):
     example = {"amplitude": 5e-6, "period": 2e-4}
     neutral = {"amplitude": 0.0}
     order = 30
+
+
+@register
+class SensorDrift(Effect):
+    """The reading drifts while frame and scale settle to their temperature."""
+
+    name = "sensor-drift"
+    place = Place.SENSOR
+    parameters = (
+        Parameter("drift", "m", -1e3, 1e3, "change of the reading in the end"),
+        Parameter("time_constant", "s", 0.0, 1e7, "with which it comes, from the start", open_low=True),
+    )
+    kernel = sensor_drift
+    inverse = sensor_drift_inverse
+    says = "the reading drifts as frame and scale warm up"
+    equation = "y = x + drift (1 - exp(-t / T))"
+    source = "Bryan (1990), CIRP Annals 39(2), thermal error"
+    signature = "position-dependent forces that shift along the stroke with time"
+    experiment = "coming back to the same stop or cogging pattern over a long run"
+    example = {"drift": 2e-4, "time_constant": 1.5}
+    neutral = {"drift": 0.0}
+    order = 40
+
+
+@register
+class SensorJump(Effect):
+    """The reading jumps once: missed counts of an encoder, fringe slip of an interferometer."""
+
+    name = "sensor-jump"
+    place = Place.SENSOR
+    parameters = (
+        Parameter("size", "m", -1e3, 1e3, "by how much"),
+        Parameter("time", "s", 0.0, 1e9, "when, from the start of the run"),
+    )
+    kernel = sensor_jump
+    inverse = sensor_jump_inverse
+    says = "the reading jumps once and stays off: missed counts, fringe slip"
+    equation = "y = x + size from the time on"
+    source = "encoder and interferometer data sheets: counting errors beyond the largest speed"
+    signature = "one sample of enormous apparent acceleration, everything in position shifted after it"
+    experiment = "returning to a mechanical reference before and after fast motion"
+    example = {"size": 2e-4, "time": 2.3004}
+    neutral = {"size": 0.0}
+    order = 50
 
 
 @register

@@ -1,4 +1,4 @@
-"""Friction that depends on speed: viscous, quadratic, micro-damping, Stribeck."""
+"""Friction by speed: viscous, quadratic, micro-damping, Stribeck; differing by direction; late."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import math
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.level import speed_midway
-from rtcomp.physics.wires import FRICTION, REACH, VELOCITY
+from rtcomp.physics.level import speed_midway, viscous_speed
+from rtcomp.physics.wires import FRICTION, LATE, REACH, SKEW, STEP, VELOCITY
 
 
 @effect_kernel
 def viscous(p: Floats, s: Floats, w: Floats) -> None:
     """p: coefficient (N s/m)."""
-    w[FRICTION] += p[0] * w[VELOCITY]
+    w[FRICTION] += p[0] * viscous_speed(w)
 
 
 @effect_kernel
@@ -32,9 +32,31 @@ def stribeck(p: Floats, s: Floats, w: Floats) -> None:
 
 
 @effect_kernel
+def asymmetric_viscous(p: Floats, s: Floats, w: Floats) -> None:
+    """p: ratio (1)."""
+    w[SKEW] = p[0]
+
+
+@effect_kernel
+def frictional_lag(p: Floats, s: Floats, w: Floats) -> None:
+    """p: time constant (s); s: lagged velocity, velocity at the last call (m/s).
+
+    Exact for a velocity that changes linearly over the step.
+    """
+    v, h = w[VELOCITY], w[STEP]
+    if p[0] <= 0.0:
+        s[0] = v
+    elif h > 0.0:
+        keep = math.exp(-h / p[0])
+        s[0] = v + (s[0] - s[1]) * keep - (v - s[1]) * -math.expm1(-h / p[0]) * p[0] / h
+    s[1] = v
+    w[LATE] = v - s[0]
+
+
+@effect_kernel
 def quadratic_drag(p: Floats, s: Floats, w: Floats) -> None:
     """p: coefficient (N s^2/m^2)."""
-    w[FRICTION] += p[0] * abs(w[VELOCITY]) * w[VELOCITY]
+    w[FRICTION] += p[0] * abs(w[VELOCITY] - w[LATE]) * viscous_speed(w)
 
 
 @register
@@ -122,3 +144,52 @@ class Stribeck(Effect):
     example = {"rise": 0.3, "velocity": 2e-3}
     neutral = {"rise": 0.0}
     order = 20
+
+
+@register
+class AsymmetricViscousFriction(Effect):
+    """The speed-dependent part differs by direction.
+
+    It weights `viscous-friction`, `quadratic-drag` and the viscous part of a friction model; `micro-damping`
+    and the damping of bristles belong to the contacts and stay as they are. Without such a part in the stage
+    it is without effect.
+    """
+
+    name = "asymmetric-viscous-friction"
+    place = Place.FRICTION
+    parameters = (
+        Parameter("ratio", "1", -1.0, 1.0, "forward less backward over their sum: 1 + ratio and 1 - ratio"),
+    )
+    kernel = asymmetric_viscous
+    says = "friction in proportion to speed is larger in one direction than in the other"
+    equation = "c <- c (1 + ratio sgn(v))"
+    source = "Janot, Gautier, Brunot (2019), EMPS benchmark: viscous friction by direction"
+    signature = "residual force in proportion to the size of speed, with the same sign in both directions"
+    experiment = "constant speeds, spaced logarithmically, in both directions"
+    example = {"ratio": 0.4}
+    neutral = {"ratio": 0.0}
+    order = 10
+
+
+@register
+class FrictionalLag(Effect):
+    """Friction follows speed late.
+
+    Viscous and quadratic friction and every level that falls with speed (`stribeck`, and that of lugre, gms,
+    leuven and modified-leuven, beside what lag these have of themselves) take the lagged speed; damping of
+    the contacts does not. `dahl` and stop elements alone have nothing that depends on speed.
+    """
+
+    name = "frictional-lag"
+    place = Place.FRICTION
+    parameters = (Parameter("time_constant", "s", 0.0, 1e2, "with which friction follows speed"),)
+    kernel = frictional_lag
+    says = "the speed-dependent part of friction follows speed late, as the lubricant film builds up"
+    equation = "T dv'/dt = v - v',  F = F(v')"
+    source = "Hess, Soom (1990), J. Tribology 112(1); Armstrong-Helouvry, Dupont, Canudas de Wit (1994)"
+    signature = "friction in sliding differs between speeding up and slowing down: a loop over speed"
+    experiment = "speeds that oscillate around the Stribeck velocity without reversal, slowly and fast"
+    example = {"time_constant": 2e-2}
+    neutral = {"time_constant": 0.0}
+    order = 5
+    states = 2

@@ -2,6 +2,12 @@
 
 Every effect kernel gets the same array `w`. Forces act on the mass, positive with position; friction
 opposes motion. All SI.
+
+Who drives the chain resets before each step what effects add to (DRIVE, PUSH, FRICTION: 0), multiply (REACH,
+SCALE: 1) and take from the stage (MASS, GAIN). GRIP, GRIP_LEVEL, GRIP_STIFFNESS and BEHIND stay from step to
+step: written late in the chain, they are read before that at the next step (0 at first). LATE and SKEW are
+written by their one effect at each step and are 0 without it. A stage has one friction model; of two, the
+later one's GRIP would be read.
 """
 
 from __future__ import annotations
@@ -23,4 +29,12 @@ GAIN = 13  # N/V, force per volt
 SENSED = 14  # m, position on its way through the sensor
 NOISE = 15  # 1, a fresh standard normal number for the sensor
 
-COUNT = 16
+GRIP = 16  # N, force of the friction model after its last step, without damping
+GRIP_LEVEL = 17  # N, at which its sliding settles at REACH and SCALE 1
+GRIP_STIFFNESS = 18  # N/m, its slope at rest with everything sticking
+BEHIND = 19  # N, friction on the load behind a play after its last step
+LATE = 20  # m/s, how far the speed that speed-dependent friction sees is behind
+SKEW = 21  # 1, speed-dependent friction is 1 + SKEW times larger forward, 1 - SKEW backward
+GRAIN = 22  # m, motion smaller than this is the sensor's noise; 0 in simulation
+
+COUNT = 23

@@ -9,30 +9,39 @@ starts relaxed at the first row.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from rtcomp.kernels import Floats, compiled
+from rtcomp.kernels import Floats, call_effect, compiled
 from rtcomp.physics import Effect, Place, wires
+from rtcomp.physics.program import Program, run_chain
 from rtcomp.physics.wires import (
     ACCELERATION,
+    COUNT,
     DRIVE,
     FRICTION,
     GAIN,
+    GRAIN,
     MASS,
     MOVED,
     POSITION,
     PUSH,
     REACH,
     SCALE,
+    SENSED,
     STEP,
     TIME,
     VELOCITY,
     VOLTS,
 )  # fmt: skip
-from rtcomp.stage.simulate import Program, run_chain
 from rtcomp.stage.stage import Stage
+
+_STEADY = {"drive-offset", "drive-deadband", "drive-saturation", "drive-gain", "drive-force"}
+"""Effects of the drive whose force does not change while the command is held."""
+_PARTS = 8
+"""Parts of a row over which the force of another drive is averaged."""
 
 
 @dataclass(frozen=True)
@@ -68,34 +77,50 @@ def forces(
     velocity: Floats,
     acceleration: Floats,
     volts: Floats,
+    grain: float = 0.0,
+    parts: int = 1,
 ) -> Forces:
-    """Run the effects `chain` along a motion; all arrays (K,), equally spaced in time, SI units."""
+    """Run the effects `chain` along a motion; all arrays (K,), equally spaced in time, SI units.
+
+    `position` is the true one; effects of the sensor are left out. `volts` is the command that was held up
+    to each row. Motion there and back within `grain` (m) is noise. Rows are cut into `parts`, or more where
+    an effect needs it; the drive's force is the mean over them, the others are those at the row.
+    """
     program = Program([e for e in chain if e.place is not Place.SENSOR])
     out = np.empty((4, time.size))
+    row = float((time[-1] - time[0]) / max(time.size - 1, 1))
+    parts = max(math.ceil(row / min((e.longest_step() for e in chain), default=math.inf) - 1e-9), parts)
     motion = np.ascontiguousarray(np.column_stack([time, position, velocity, acceleration, volts]))
     base = np.array([stage.mass, stage.force_constant])
-    _along(program.steps, program.p, program.s, np.zeros(wires.COUNT), base, motion, out)
+    w = np.zeros(wires.COUNT)
+    w[GRAIN] = grain
+    _along(program.steps, program.p, program.s, w, base, motion, parts, out)
     return Forces(*out)
 
 
 @compiled
 def _along(
-    steps: np.ndarray, p: Floats, s: Floats, w: Floats, base: Floats, motion: Floats, out: Floats
+    steps: np.ndarray, p: Floats, s: Floats, w: Floats, base: Floats, motion: Floats, parts: int, out: Floats
 ) -> None:
+    """Fill `out`: the mean of the drive's force over the row's parts, the rest as it is at the row's end."""
     for k in range(motion.shape[0]):
         before = max(k - 1, 0)
-        w[TIME] = motion[k, 0]
-        w[STEP] = motion[k, 0] - motion[before, 0]
-        w[POSITION] = motion[k, 1]
-        w[MOVED] = motion[k, 1] - motion[before, 1]
-        w[VELOCITY] = motion[k, 2]
-        w[ACCELERATION] = motion[k, 3]
-        w[VOLTS] = motion[k, 4]
-        w[MASS], w[GAIN] = base[0], base[1]
-        w[DRIVE] = w[PUSH] = w[FRICTION] = 0.0
-        w[REACH] = w[SCALE] = 1.0
-        run_chain(steps, p, s, w, 0, steps[0])
-        out[0, k], out[1, k], out[2, k], out[3, k] = w[DRIVE], w[PUSH], w[FRICTION], w[MASS]
+        drive = 0.0
+        for j in range(1, parts + 1):
+            share = 1.0 - j / parts
+            w[TIME] = motion[k, 0] + share * (motion[before, 0] - motion[k, 0])
+            w[STEP] = (motion[k, 0] - motion[before, 0]) / parts
+            w[POSITION] = motion[k, 1] + share * (motion[before, 1] - motion[k, 1])
+            w[MOVED] = (motion[k, 1] - motion[before, 1]) / parts
+            w[VELOCITY] = motion[k, 2] + share * (motion[before, 2] - motion[k, 2])
+            w[ACCELERATION] = motion[k, 3]
+            w[VOLTS] = motion[k, 4]
+            w[MASS], w[GAIN] = base[0], base[1]
+            w[DRIVE] = w[PUSH] = w[FRICTION] = 0.0
+            w[REACH] = w[SCALE] = 1.0
+            run_chain(steps, p, s, w, 0, steps[0])
+            drive += w[DRIVE] / parts
+        out[0, k], out[1, k], out[2, k], out[3, k] = drive, w[PUSH], w[FRICTION], w[MASS]
 
 
 def known_force(
@@ -127,23 +152,56 @@ def force_balance(
     The force around a row is the mean of those before and after it, as the second difference of position
     is of the accelerations. Velocity and acceleration come from the position below `bandwidth_hz` (forward
     and backward filtered: no delay), the friction's memory from the position as it was measured, and both
-    sides are compared below the same bandwidth.
+    sides are compared below the same bandwidth. What the stage's sensor does to a reading is undone first.
     """
     period = float((time[-1] - time[0]) / (time.size - 1))
     cut = bandwidth(1.0 / period) if bandwidth_hz is None else bandwidth_hz
+    position = true_position(stage, time, position)
     slow = zero_phase(position, cut, 1.0 / period)
     velocity = np.gradient(slow, period)
     acceleration = np.zeros_like(slow)
     acceleration[1:-1] = (slow[2:] - 2 * slow[1:-1] + slow[:-2]) / period**2
-    held = np.append(voltage[:1], voltage[:-1])
+    grain = 1.5 * stage.sensor.noise + 0.5 * stage.sensor.resolution
     drive = [e for e in stage.chain if e.place is Place.DRIVE]
-    rest = [e for e in stage.chain if e.place is not Place.DRIVE]
-    before = forces(stage, drive, time, position, velocity, acceleration, held).drive
-    after = forces(stage, drive, time, position, velocity, acceleration, voltage).drive
-    motion = forces(stage, rest, time, position, velocity, acceleration, voltage)
+    held = np.append(voltage[:1], voltage[:-1])
+    motion = forces(stage, stage.chain, time, position, velocity, acceleration, held, grain)
     needed = motion.mass * acceleration + motion.friction - motion.push
-    given = 0.5 * (before + after)
+    varying = any(e.name not in _STEADY for e in drive)
+    over = forces(
+        stage, drive, time, position, velocity, acceleration, held, parts=_PARTS if varying else 1
+    ).drive
+    given = 0.5 * (over + np.append(over[1:], over[-1:]))
     return Balance(zero_phase(given, cut, 1.0 / period), zero_phase(needed, cut, 1.0 / period), cut)
+
+
+def true_position(stage: Stage, time: Floats, reading: Floats) -> Floats:
+    """Return the position (m, (K,)) that the stage's sensor would have read as `reading`.
+
+    The inverses of the sensor's effects, last first; a late reading is read where it was taken, by cubic
+    interpolation, the last reading standing for those that were still to come. Noise and rounding stay.
+    """
+    position = np.array(reading, dtype=np.float64)
+    for effect in reversed([e for e in stage.chain if e.place is Place.SENSOR]):
+        delay = effect.values.get("delay", 0.0)
+        if effect.inverse is not None:
+            p, s = effect.vector(), effect.initial_state()
+            _undo(effect.inverse.address, np.append(p, 0.0), np.append(s, 0.0), time, position)
+        elif delay > 0.0:
+            from scipy.interpolate import CubicSpline
+
+            position = CubicSpline(time, position)(np.minimum(time + delay, time[-1]))
+    return position
+
+
+@compiled
+def _undo(address: int, p: Floats, s: Floats, time: Floats, position: Floats) -> None:
+    w = np.zeros(COUNT)
+    for k in range(position.size):
+        w[STEP] = time[k] - w[TIME] if k > 0 else 0.0
+        w[TIME] = time[k]
+        w[SENSED] = position[k]
+        call_effect(address, p.ctypes.data, s.ctypes.data, w.ctypes.data)
+        position[k] = w[SENSED]
 
 
 def zero_phase(signal: Floats, cutoff_hz: float, rate_hz: float) -> Floats:

@@ -15,8 +15,9 @@ import math
 
 import numpy as np
 
-from rtcomp.kernels import Floats, call_effect, compiled
-from rtcomp.physics import Effect, Place, wires
+from rtcomp.kernels import Floats, compiled
+from rtcomp.physics import Place, wires
+from rtcomp.physics.program import COUNT, DRIVES, Program, run_chain
 from rtcomp.physics.wires import (
     ACCELERATION,
     DRIVE,
@@ -37,37 +38,6 @@ from rtcomp.physics.wires import (
 )  # fmt: skip
 from rtcomp.stage.stage import Stage
 
-_COUNT, _DRIVES, _LINKS = 0, 1, 2
-"""Places in a program: number of effects, how many of them (the first) are the drive's, then for each
-effect its kernel's address and where its parameters and state begin."""
-
-
-class Program:
-    """Part of a chain ready to run: addresses of kernels, all parameters, all states."""
-
-    def __init__(self, chain: list[Effect]) -> None:
-        drives = sum(1 for e in chain if e.place is Place.DRIVE)
-        vectors = [e.vector() for e in chain]
-        states = [e.initial_state() for e in chain]
-        links: list[int] = []
-        at_p = at_s = 0
-        for effect, p, s in zip(chain, vectors, states, strict=True):
-            links += [effect.kernel.address, at_p, at_s]
-            at_p, at_s = at_p + p.size, at_s + s.size
-        self.steps = np.array([len(chain), drives, *links], dtype=np.int64)
-        self.p: Floats = np.concatenate([*vectors, np.zeros(1)])
-        self.s: Floats = np.concatenate([*states, np.zeros(1)])
-
-
-@compiled
-def run_chain(steps: np.ndarray, p: Floats, s: Floats, w: Floats, first: int, last: int) -> None:
-    """Run effects `first` to `last` (not included) of a program on the wires."""
-    for j in range(first, last):
-        at = _LINKS + 3 * j
-        call_effect(
-            steps[at], p.ctypes.data + 8 * steps[at + 1], s.ctypes.data + 8 * steps[at + 2], w.ctypes.data
-        )
-
 
 @compiled
 def impulse_scale(tangent: float, mass: float, h: float) -> float:
@@ -87,7 +57,7 @@ def _integrate(
     """
     h = seconds / count
     stiffest, tangent = base[2], base[3]
-    effects, drives = steps[_COUNT], steps[_DRIVES]
+    effects, drives = steps[COUNT], steps[DRIVES]
     # The new command acts from the first instant: exchange the drive's share of the acceleration.
     before = w[DRIVE]
     w[STEP] = 0.0
@@ -131,7 +101,7 @@ def _integrate(
 def _rest(steps: np.ndarray, p: Floats, s: Floats, w: Floats, base: Floats) -> None:
     """Find the acceleration at the start, at rest and without command: springs and weight pull already."""
     w[GAIN] = base[1]
-    run_chain(steps, p, s, w, 0, steps[_COUNT])
+    run_chain(steps, p, s, w, 0, steps[COUNT])
     w[ACCELERATION] = (w[DRIVE] + w[PUSH] - w[FRICTION]) / w[MASS]
 
 
@@ -147,7 +117,7 @@ class Simulator:
         self._moving, self._moving_start = Program(moving), Program(moving)
         sensing = [e for e in stage.chain if e.place is Place.SENSOR]
         self._sensing, self._sensing_start = Program(sensing), Program(sensing)
-        stiffness = sum(e.stiffness() for e in stage.chain)
+        stiffness = largest_stiffness(stage)
         self._base = np.array([stage.mass, stage.force_constant, stiffness, 0.0])
         self.step = largest_step(stage) / substeps
         self._seed, self._start = seed, start
@@ -208,14 +178,19 @@ class Simulator:
 
 @compiled
 def _sense(steps: np.ndarray, p: Floats, s: Floats, w: Floats) -> None:
-    run_chain(steps, p, s, w, 0, steps[_COUNT])
+    run_chain(steps, p, s, w, 0, steps[COUNT])
+
+
+def largest_stiffness(stage: Stage) -> float:
+    """Return the largest stiffness (N/m) that the whole chain can put on the mass."""
+    return sum(e.stiffness() + stage.mass * e.frequency() ** 2 for e in stage.chain)
 
 
 def largest_step(stage: Stage) -> float:
     """Return the longest integration step (s) that resolves the stage's stiffness and damping."""
-    stiffness = sum(e.stiffness() for e in stage.chain)
-    damping = sum(e.damping() for e in stage.chain)
-    step = 1.0 / stage.rate
+    stiffness = largest_stiffness(stage)
+    damping = sum(e.damping() + stage.mass * e.frequency() for e in stage.chain)
+    step = min(1.0 / stage.rate, *(e.longest_step() for e in stage.chain))
     if stiffness > 0:
         step = min(step, 0.03 * math.sqrt(stage.mass / stiffness))
     if damping > 0:

@@ -41,7 +41,9 @@ class Stage:
 
     def __init__(self, file: StageFile) -> None:
         self.file = file
-        self.chain: list[Effect] = sorted(_chain(file), key=lambda e: (e.place, e.order))
+        chain = _chain(file)
+        chain += [companion for effect in chain for companion in effect.companions()]
+        self.chain: list[Effect] = sorted(chain, key=lambda e: (e.place, e.order))
 
     @classmethod
     def load(cls, path: str | Path) -> Stage:

@@ -1,0 +1,81 @@
+"""The shape of presliding branches: differing by direction, or by the force at which they begin."""
+
+from __future__ import annotations
+
+from rtcomp.kernels import Floats, effect_kernel
+from rtcomp.physics.catalogue import register
+from rtcomp.physics.effect import Effect, Parameter, Place
+from rtcomp.physics.wires import FRICTION, GRAIN, GRIP, GRIP_LEVEL, MOVED, REACH, SCALE
+
+
+@effect_kernel
+def asymmetric_friction(p: Floats, s: Floats, w: Floats) -> None:
+    """p: asymmetry (1); s: place (m) within the sensor's grain, inside which motion has no direction."""
+    inside = s[0] + w[MOVED]
+    s[0] = min(max(inside, -w[GRAIN]), w[GRAIN])
+    w[MOVED] += p[0] * abs(inside - s[0])
+
+
+@effect_kernel
+def non_congruent_friction(p: Floats, s: Floats, w: Floats) -> None:
+    """p: softening (1)."""
+    level = w[GRIP_LEVEL] * w[REACH] * w[SCALE]
+    if level > 0.0:
+        share = min(abs(w[GRIP]) / level, 1.0)
+        bent = w[GRIP] * (1.0 + p[0] * (1.0 - share))
+        w[FRICTION] += bent - w[GRIP]
+        w[GRIP] = bent
+
+
+@register
+class AsymmetricFriction(Effect):
+    """Stop elements that are stiffer when they are loaded forward than when backward, at equal yield force.
+
+    The friction model sees displacements (1 + asymmetry) times as long forward and (1 - asymmetry) times
+    backward; so the levels of sliding are alike (a difference of those is `constant-force`, from which no
+    motion that slides both ways can tell it), and every model takes part.
+
+    An element's loop that yields on both sides, or on the stiffer one, closes and dissipates. One that yields
+    on neither moves towards the stiffer side, by 2 k asymmetry for each unit of its travel there and back,
+    until it yields there and its loop closes too. This ratcheting is bounded by the yield force, but while it
+    lasts it is not passive. Reversals within GRAIN, the noise of a recorded position, have no direction, so
+    that noise does not ratchet.
+    """
+
+    name = "asymmetric-friction"
+    place = Place.FRICTION
+    parameters = (Parameter("asymmetry", "1", -0.9, 0.9, "difference of stiffness over its sum"),)
+    kernel = asymmetric_friction
+    says = "presliding is stiffer in one direction than in the other, up to the same level"
+    equation = "dz = (1 + asymmetry sgn(dx)) dx"
+    source = "Al Janaideh, Rakheja, Su (2011), IEEE/ASME Trans. Mechatronics 16(4), asymmetric hysteresis"
+    signature = "residual force after reversals, alike in sign after both, gone once everything slides"
+    experiment = "loops of several sizes inside presliding, each repeated"
+    example = {"asymmetry": 0.1}
+    neutral = {"asymmetry": 0.0}
+    order = 40
+    states = 1
+
+
+@register
+class NonCongruentFriction(Effect):
+    """Equal reversals at different force give loops of different shape.
+
+    The friction model's force F is bent: steeper by 1 + softening at zero force, less steep by 1 - softening
+    at its level, where it is unchanged. A bent output keeps what a memory without drift needs: closed loops
+    stay closed, wiping-out holds, and, the bend being monotone, loops dissipate; only congruency is lost. It
+    needs a friction model in the stage; of damping nothing is bent.
+    """
+
+    name = "non-congruent-friction"
+    place = Place.FRICTION
+    parameters = (Parameter("softening", "1", -1.0, 1.0, "loss of slope from the middle to the level"),)
+    kernel = non_congruent_friction
+    says = "contacts are softer the more they carry: loops at high force are flatter than those around zero"
+    equation = "F <- F (1 + softening (1 - |F| / level))"
+    source = "Mayergoyz (1991), Mathematical Models of Hysteresis; Kuhnen (2003), European J. Control 9(4)"
+    signature = "residual force odd in the friction force, largest at half of its level"
+    experiment = "equal small reversals started from different forces"
+    example = {"softening": 0.3}
+    neutral = {"softening": 0.0}
+    order = 80

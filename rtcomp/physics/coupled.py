@@ -1,0 +1,192 @@
+"""A second mass that hangs on the first: by a spring (resonance), or within a play (backlash).
+
+The moving mass of the stage is the sum of both; what is behind the coupling is taken from MASS. In the step
+the first mass moves at constant speed, as the integrator has it and as recorded rows are read.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from rtcomp.kernels import Floats, compiled, effect_kernel
+from rtcomp.physics.catalogue import register
+from rtcomp.physics.effect import Effect, Parameter, Place
+from rtcomp.physics.wires import BEHIND, FRICTION, MASS, MOVED, PUSH, STEP, VELOCITY
+
+LOAD_SHARE: Final = 0.6
+"""Share of the moving mass that is behind the play."""
+CONTACT: Final = 2.0 * math.pi * 300.0
+"""Angular frequency (rad/s) of the load on its contact."""
+CONTACT_DAMPING: Final = 0.1
+"""Damping ratio of the load on its contact: it bounces back with about three quarters of its speed."""
+FINEST: Final = 0.1
+"""Longest step (rad) of the contact's oscillation."""
+
+
+@compiled
+def swing(q: float, r: float, omega: float, zeta: float, h: float) -> tuple[float, float]:
+    """Return deflection and rate of a free damped oscillation after `h`: exact, for 0 <= zeta < 1."""
+    decay = zeta * omega
+    turning = omega * math.sqrt(1.0 - zeta * zeta)
+    fade = math.exp(-decay * h)
+    c, s = math.cos(turning * h), math.sin(turning * h) / turning
+    return (
+        fade * (q * c + (r + decay * q) * s),
+        fade * (r * c - (decay * r + omega * omega * q) * s),
+    )
+
+
+@effect_kernel
+def resonance(p: Floats, s: Floats, w: Floats) -> None:
+    """p: frequency (Hz), damping (1), mass ratio (1); s: deflection (m) and speed (m/s) of the second mass.
+
+    The deflection is counted from the first mass, the speed from the ground.
+    """
+    omega = 2.0 * math.pi * p[0]
+    mass = p[2] * w[MASS]
+    w[MASS] -= mass
+    h = w[STEP]
+    if h > 0.0:
+        base = w[MOVED] / h
+        q, r = swing(s[0], s[1] - base, omega, p[1], h)
+        s[0], s[1] = q, r + base
+    else:
+        s[0] -= w[MOVED]
+    w[PUSH] += mass * (omega * omega * s[0] + 2.0 * p[1] * omega * (s[1] - w[VELOCITY]))
+
+
+@compiled
+def contact(q: float, r: float, gap: float) -> float:
+    """Return the contact's acceleration of the load (m/s^2), towards the middle; it never pulls."""
+    depth = abs(q) - gap
+    if depth <= 0.0:
+        return 0.0
+    side = math.copysign(1.0, q)
+    return -side * max(CONTACT * CONTACT * depth + 2.0 * CONTACT_DAMPING * CONTACT * r * side, 0.0)
+
+
+@effect_kernel
+def backlash(p: Floats, s: Floats, w: Floats) -> None:
+    """p: gap (m); s: place of the load in the play (m) and its speed (m/s, from the ground).
+
+    Friction is a kick at the start of the step, contact and free flight are exact over it. What runs after
+    this sees the load's motion.
+    """
+    if p[0] <= 0.0:
+        return
+    mass = LOAD_SHARE * w[MASS]
+    w[MASS] -= mass
+    h = w[STEP]
+    before = s[0]
+    if h > 0.0:
+        base = w[MOVED] / h
+        q, r = s[0], s[1] - h * w[BEHIND] / mass - base
+        if contact(q, r, p[0]) != 0.0:
+            side = math.copysign(p[0], q)
+            q, r = swing(q - side, r, CONTACT, CONTACT_DAMPING, h)
+            q += side
+        else:
+            q += r * h
+        s[0], s[1] = q, r + base
+        w[MOVED] += q - before
+    else:
+        s[0] -= w[MOVED]
+        w[MOVED] = 0.0
+    w[PUSH] -= mass * contact(s[0], s[1] - w[VELOCITY], p[0])
+    w[VELOCITY] = s[1]
+
+
+@effect_kernel
+def load_friction(p: Floats, s: Floats, w: Floats) -> None:
+    """p: gap (m)."""
+    if p[0] > 0.0:
+        w[BEHIND] = w[FRICTION]
+        w[FRICTION] = 0.0
+
+
+@register
+class Resonance(Effect):
+    """Second mass on a spring; `mass_ratio` is its share of the stage's moving mass, `frequency` its own.
+
+    The frequency is that of the second mass while the first is held, where the drive's response has its
+    antiresonance; free, both swing at frequency / sqrt(1 - mass_ratio).
+    """
+
+    name = "resonance"
+    place = Place.MECHANICS
+    parameters = (
+        Parameter("frequency", "Hz", 0.0, 1e5, "of the second mass with the first held", open_low=True),
+        Parameter("damping", "1", 0.0, 0.9, "its damping ratio"),
+        Parameter("mass_ratio", "1", 0.0, 0.9, "its share of the moving mass"),
+    )
+    kernel = resonance
+    says = "part of the moving mass hangs on a spring: a tool, a sensor head, an elastic coupling"
+    equation = "m_2 (x + q)'' = -m_2 (w^2 q + 2 d w q'),  F = m_2 (w^2 q + 2 d w q'),  m_2 = ratio m"
+    source = "Ormondroyd, Den Hartog (1928), Trans. ASME 50, the dynamic vibration absorber"
+    signature = "residual force in proportion to acceleration, growing towards one frequency, ringing there"
+    experiment = "a chirp through the resonance, or short accelerations followed by rest"
+    example = {"frequency": 30.0, "damping": 0.05, "mass_ratio": 0.3}
+    neutral = {"mass_ratio": 0.0}
+    order = 60
+    states = 2
+
+    def frequency(self) -> float:
+        """Return the larger of the frequency of both masses and that of its damping on the first (rad/s)."""
+        omega, damping = 2.0 * math.pi * self.values["frequency"], self.values["damping"]
+        ratio = self.values["mass_ratio"]
+        return omega * max(1.0 / math.sqrt(1.0 - ratio), 2.0 * damping * ratio / (1.0 - ratio))
+
+
+@register
+class Backlash(Effect):
+    """Play of +-gap between the driven, measured mass and a load.
+
+    Only the gap is a parameter. What else a play needs is fixed: 60 % of the moving mass (LOAD_SHARE) and all
+    friction are behind it, the sensor, springs and other forces before it, and the load meets either end as a
+    mass on a spring of 300 Hz (CONTACT) with damping ratio 0.1 that does not pull. It starts in the middle,
+    at rest. `LoadFriction` closes it at the end of the chain.
+    """
+
+    name = "backlash"
+    place = Place.MECHANICS
+    parameters = (Parameter("gap", "m", 0.0, 1.0, "half of the play; 0 is none"),)
+    kernel = backlash
+    says = "play between drive and load: after a reversal the load stays behind, until it is met with a knock"
+    equation = "m_2 (x + q)'' = -k (|q| - gap)^+ sgn(q) - c q' in contact - friction"
+    source = "Nordin, Gutman (2002), Automatica 38(10), controlling mechanical systems with backlash"
+    signature = "after each reversal friction and part of the inertia are missing over the same travel"
+    experiment = "slow reversals, and strokes of several sizes around the play"
+    example = {"gap": 2e-5}
+    neutral = {"gap": 0.0}
+    order = 70
+    states = 2
+
+    def frequency(self) -> float:
+        """Return that of load and stage on the contact (rad/s); 0 without a gap."""
+        return CONTACT / math.sqrt(1.0 - LOAD_SHARE) if self.values["gap"] > 0.0 else 0.0
+
+    def longest_step(self) -> float:
+        """Return a tenth of a radian of the contact (s)."""
+        return FINEST / CONTACT if self.values["gap"] > 0.0 else math.inf
+
+    def companions(self) -> list[Effect]:
+        """Return what takes the friction from the mass and gives it to the load."""
+        return [LoadFriction(**self.values)]
+
+
+class LoadFriction(Effect):
+    """The end of a play's step: friction acts on the load. Not in the catalogue: `backlash` brings it."""
+
+    name = "load-friction"
+    place = Place.FRICTION
+    parameters = Backlash.parameters
+    kernel = load_friction
+    says = "friction acts on the load behind the play"
+    equation = "F_load <- F,  F <- 0"
+    source = "Newton's third law"
+    signature = "that of backlash"
+    experiment = "that of backlash"
+    example = Backlash.example
+    neutral = Backlash.neutral
+    order = 100

@@ -1,0 +1,39 @@
+"""Friction that depends on the load that the drive transmits."""
+
+from __future__ import annotations
+
+from rtcomp.kernels import Floats, effect_kernel
+from rtcomp.physics.catalogue import register
+from rtcomp.physics.effect import Effect, Parameter, Place
+from rtcomp.physics.wires import DRIVE, GRIP_LEVEL, REACH
+
+
+@effect_kernel
+def load_dependent_friction(p: Floats, s: Floats, w: Floats) -> None:
+    """p: coefficient (1)."""
+    if w[GRIP_LEVEL] > 0.0:
+        w[REACH] *= 1.0 + p[0] * abs(w[DRIVE]) / w[GRIP_LEVEL]
+
+
+@register
+class LoadDependentFriction(Effect):
+    """Friction grows with the transmitted load.
+
+    The load is the size of the drive's force, which carries weight and inertia as well. The sliding level
+    grows by `coefficient` times it, at equal stiffness: while everything sticks a changing load changes no
+    force, and elements beyond a falling level slip back to it. It needs a friction model in the stage; the
+    level, where it falls with speed, is that of the step before.
+    """
+
+    name = "load-dependent-friction"
+    place = Place.FRICTION
+    parameters = (Parameter("coefficient", "1", 0.0, 10.0, "friction force over transmitted force"),)
+    kernel = load_dependent_friction
+    says = "friction grows with the force that the drive transmits, as in gears and screws"
+    equation = "level <- level + coefficient |F_drive|"
+    source = "Duclusaud, Passault, Padois, Ly (2024), arXiv 2410.08650, load-dependent friction"
+    signature = "residual force with the sign of motion whose size is in proportion to the command's"
+    experiment = "the same stroke at several loads, or accelerating and coasting"
+    example = {"coefficient": 0.05}
+    neutral = {"coefficient": 0.0}
+    order = 20
