@@ -173,7 +173,7 @@ def test_voltage_comes_before_force_in_the_drive():
 
 
 def test_rows_are_checked():
-    with pytest.raises(TypeError, match=r"shape \(n, 16\)"):
+    with pytest.raises(TypeError, match=rf"shape \(n, {COUNT}\)"):
         over_rows([], np.zeros((3, COUNT + 1)))
     with pytest.raises(TypeError):
         over_rows([], np.zeros((3, COUNT), dtype=np.float32))
