@@ -1,0 +1,89 @@
+"""What a stage does in simulation is what its force balance makes of the recording, for every entry.
+
+An entry needs nothing here: a stage with its `example` is simulated in closed loop and balanced by itself and
+without the entry.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rtcomp import physics
+from rtcomp.physics import Place
+from rtcomp.stage.balance import force_balance
+from rtcomp.stage.simulate import Simulator
+from rtcomp.stage.stage import Stage
+
+ENTRIES = list(physics.entries())
+MODELS = {"maxwell-slip", "dahl", "lugre", "gms", "leuven", "modified-leuven"}
+UNSEEN = {
+    "sensor-noise": "noise of a reading is not undone: there is nothing to balance without it",
+    "sensor-resolution": "rounding is not undone: there is nothing to balance without it",
+}
+"""Entries that no balance shows, and why."""
+FRICTION = [
+    {"stiffness": 3.2e5, "reach": 1.5e-6},
+    {"stiffness": 1.3e5, "reach": 7e-6},
+    {"stiffness": 6e4, "reach": 2.4e-5},
+]
+PLAIN = Stage.from_dict(
+    {
+        "stage": {
+            "mass": 2.0,
+            "force_constant": 4.0,
+            "voltage_limit": 10.0,
+            "viscous": 40.0,
+            "micro_damping": 250.0,
+            "friction": FRICTION,
+        },
+        "rate": 1000.0,
+    }
+)
+
+
+def stage_with(entry: type[physics.Effect]) -> Stage:
+    """The plain stage with the example of `entry`; a friction model in the place of its own."""
+    if entry.name in MODELS:
+        return PLAIN.with_changes(stage={"friction": {"model": entry.name, **entry.example}})
+    return PLAIN.with_changes(stage={"effects": [{"name": entry.name, **entry.example}]})
+
+
+def recorded(stage: Stage, seconds: float = 6.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Closed loop: strokes of a millimetre and of micrometres, a rest at the end. Time, position, voltage."""
+    rate, simulator = stage.rate, Simulator(stage)
+    t = np.arange(round(seconds * rate)) / rate
+    fade = np.clip(t / 0.5, 0.0, 1.0) * np.clip((5.0 - t) / 0.2, 0.0, 1.0)
+    reference = 8e-4 * fade * np.sin(2 * np.pi * 1.1 * t) * np.sin(2 * np.pi * 0.23 * t)
+    reference += fade * (2e-5 * np.sin(2 * np.pi * 7 * t) + 8e-5 * np.sin(2 * np.pi * 3.3 * t))
+    position, voltage = np.empty(t.size), np.empty(t.size)
+    integral = slow = last = volts = 0.0
+    for k in range(t.size):
+        if k:
+            simulator.advance(volts, 1.0 / rate)
+        x = position[k] = simulator.measure()
+        slow += 0.3 * ((x - last) * rate - slow)
+        integral = np.clip(integral + 1e5 * (reference[k] - x) / rate, -10.0, 10.0)
+        volts = float(np.clip(8e3 * (reference[k] - x) + integral - 60.0 * slow, -10, 10))
+        voltage[k], last = volts, x
+    return t, position, voltage
+
+
+@pytest.mark.parametrize("entry", ENTRIES, ids=[e.name for e in ENTRIES])
+def test_the_balance_is_that_of_the_simulation(entry: type[physics.Effect]) -> None:
+    if entry.name in UNSEEN:
+        pytest.skip(UNSEEN[entry.name])
+    stage = stage_with(entry)
+    t, position, voltage = recorded(stage)
+    with_it = force_balance(stage, t, position, voltage).relative_error
+    without = force_balance(PLAIN, t, position, voltage).relative_error
+    print(entry.name, with_it, without)
+    assert with_it < 0.03
+    if entry.name != "maxwell-slip" or stage.friction != PLAIN.friction:
+        assert without > 2 * with_it
+
+
+def test_only_sensors_that_cannot_be_undone_are_left_out() -> None:
+    for name in UNSEEN:
+        entry = physics.entry(name)
+        assert entry.place is Place.SENSOR and entry.inverse is None
