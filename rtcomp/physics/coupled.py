@@ -70,8 +70,8 @@ def contact(q: float, r: float, gap: float) -> float:
 def backlash(p: Floats, s: Floats, w: Floats) -> None:
     """p: gap (m); s: place of the load in the play (m) and its speed (m/s, from the ground).
 
-    Friction is a kick at the start of the step, contact and free flight are exact over it. What runs after
-    this sees the load's motion.
+    Friction is a kick at the start of the step; free flight up to the contact and the contact are exact. A
+    contact that begins lasts to the end of the step. What runs after this sees the load's motion.
     """
     if p[0] <= 0.0:
         return
@@ -82,12 +82,18 @@ def backlash(p: Floats, s: Floats, w: Floats) -> None:
     if h > 0.0:
         base = w[MOVED] / h
         q, r = s[0], s[1] - h * w[BEHIND] / mass - base
-        if contact(q, r, p[0]) != 0.0:
-            side = math.copysign(p[0], q)
-            q, r = swing(q - side, r, CONTACT, CONTACT_DAMPING, h)
+        left = h
+        side = math.copysign(p[0], q)
+        if contact(q, r, p[0]) == 0.0:  # in flight, up to the end it flies to
+            side = math.copysign(p[0], r)
+            flight = (side - q) / r if r != 0.0 else h
+            if flight < h:
+                q, left = side, h - flight
+            else:
+                q, left = q + r * h, 0.0
+        if left > 0.0:
+            q, r = swing(q - side, r, CONTACT, CONTACT_DAMPING, left)
             q += side
-        else:
-            q += r * h
         s[0], s[1] = q, r + base
         w[MOVED] += q - before
     else:
