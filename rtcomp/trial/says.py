@@ -1,0 +1,130 @@
+"""What a diagnosis of a case said, read from its ``diagnosis.json``, and whether that is right."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rtcomp.trial.calibrate import Grown
+
+LATE = frozenset({"drive-delay", "drive-lag", "sensor-delay"})
+STEADY = frozenset({"drive-offset", "constant-force", "gravity"})
+ALIASES: dict[str, frozenset[str]] = {
+    **dict.fromkeys(LATE, LATE),
+    **dict.fromkeys(STEADY, STEADY),
+    "back-emf": frozenset({"back-emf", "viscous-friction", "asymmetric-viscous-friction"}),
+    "viscous-friction": frozenset({"viscous-friction", "back-emf"}),
+    "outside-force-bump": frozenset({"position-force", "unexplained"}),
+}
+"""Names that no recording of one axis tells from the truth, the truth included."""
+FRICTION = frozenset({"friction", "friction_level", "friction-level", "friction_reach", "friction_shape"})
+RETUNED: dict[str, frozenset[str]] = {
+    "drive-gain": frozenset({"force_constant"}) | FRICTION,
+    "inertia": frozenset({"mass"}),
+    "viscous-friction": frozenset({"viscous"}),
+    "back-emf": frozenset({"viscous"}),
+}
+"""Parameters of the stage whose retuning says the same as the effect's name."""
+MOVED = 0.11
+"""A retuning by more than a belief is ever wrong without anything hidden (a tenth)."""
+UNEXPLAINED = "unexplained"
+
+
+def alike(truth: str) -> frozenset[str]:
+    """Return the names that say what `truth` is."""
+    return ALIASES.get(truth, frozenset({UNEXPLAINED if truth.startswith("outside-") else truth}))
+
+
+@dataclass(frozen=True)
+class Said:
+    """A diagnosis, as far as it is scored."""
+
+    verdict: str
+    named: tuple[tuple[str, ...], ...]
+    """Sets of names, in the order given; without "unexplained"."""
+    unexplained: bool
+    moved: tuple[str, ...] = ()
+    """Parameters retuned by more than a belief is wrong, without element or part: ``friction``."""
+    intervals: dict[str, dict[str, tuple[float, float, float]]] = field(default_factory=dict)
+    """Value, low and high of the parameters of each effect's likeliest name, by that name."""
+    retuned: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    """Value, low and high of each retuned parameter."""
+
+    @classmethod
+    def read(cls, path: Path) -> Said:
+        """Read ``diagnosis.json``; raise ValueError where it is not as docs/formats.md has it."""
+        try:
+            data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+            effects = [(tuple(map(str, e["names"])), e.get("parameters", {})) for e in data["effects"]]
+            retuned = {str(r["parameter"]): r for r in data["retuned"]}
+            moved = {
+                name.split("[")[0].split(".")[0]
+                for name, r in retuned.items()
+                if r["from"] and abs(r["to"] / r["from"] - 1.0) > MOVED
+            }
+            return cls(
+                str(data["verdict"]),
+                tuple(n for names, _ in effects if (n := tuple(x for x in names if x != UNEXPLAINED))),
+                data["verdict"] == UNEXPLAINED or any(UNEXPLAINED in names for names, _ in effects),
+                tuple(sorted(moved)),
+                {names[0]: _intervals(p) for names, p in effects if names},
+                {name: (float(r["to"]), float(r["low"]), float(r["high"])) for name, r in retuned.items()},
+            )
+        except (KeyError, TypeError, AttributeError, IndexError, OSError) as error:
+            raise ValueError(f"{path.name} is not a diagnosis: {type(error).__name__} {error}") from error
+
+
+def _intervals(parameters: dict[str, Any]) -> dict[str, tuple[float, float, float]]:
+    return {k: (float(v["value"]), float(v["low"]), float(v["high"])) for k, v in parameters.items()}
+
+
+@dataclass(frozen=True)
+class Match:
+    """How one hidden effect fared."""
+
+    found: bool
+    """A set of names holds it, and nothing that is not its alias; or its parameter was retuned."""
+    first: bool
+    """So, and the likeliest name is right; for an effect alone also that this comes first."""
+    held: bool
+    """Some set of names holds it, whatever else is in that set; or its parameter was retuned."""
+    size: int
+    """Names in that set; 1 for a retuning, 0 where nothing holds it."""
+    name: str
+    """The likeliest name of that set, "" where there is none."""
+
+
+def match(said: Said, hidden: tuple[Grown, ...]) -> tuple[list[Match], list[tuple[str, ...]]]:
+    """Return how each effect fared, and the sets of names that belong to none."""
+    left = list(said.named)
+    matches = []
+    for effect in hidden:
+        names = alike(effect.name) - {UNEXPLAINED}
+        fitting = next((n for n in left if set(n) & names and set(n) <= names), None)
+        holding = fitting or next((n for n in left if set(n) & names), None)
+        if holding is not None:
+            # A set that holds it among strangers is not named right, but is not another false name either.
+            left.remove(holding)
+            matches.append(Match(fitting is not None, holding[0] in names, True, len(holding), holding[0]))
+        elif retunes(said, effect.name):
+            matches.append(Match(True, True, True, 1, ""))
+        elif effect.name.startswith("outside-") and said.unexplained:
+            matches.append(Match(True, True, True, 1, UNEXPLAINED))
+        else:
+            matches.append(Match(False, False, False, 0, ""))
+    return matches, left
+
+
+def retunes(said: Said, truth: str) -> bool:
+    """Say whether a retuning says what `truth` is."""
+    if truth.startswith("retuned-"):
+        return said.verdict == "retuned"
+    return bool(set(said.moved) & RETUNED.get(truth, frozenset()))
+
+
+def within(value: float, truth: float, part: float) -> bool:
+    """Say whether a value is within `part` of the truth."""
+    return math.isfinite(value) and abs(value / truth - 1.0) <= part

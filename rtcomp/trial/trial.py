@@ -1,0 +1,232 @@
+"""A trial from end to end: draw, seal, let others diagnose, open, score."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rtcomp import __version__
+from rtcomp.trial.draw import Case, draw, plan
+from rtcomp.trial.figures import Figure, Seen, figures, seen
+from rtcomp.trial.rival import RIVALS, missing
+from rtcomp.trial.run import Outcome, Processes, Task
+from rtcomp.trial.says import Said
+from rtcomp.trial.score import Errors, Scored, score
+from rtcomp.trial.seal import Sealed
+from rtcomp.trial.stagefile import exact_stage, write_recording
+from rtcomp.yamlfile import dump_yaml
+
+EDGE_ROWS = 100
+"""Rows left out of the relative force error at either end: filters settle."""
+REPLAY_S = 300.0
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a trial is to be. `program` is called as ``PROGRAM diagnose ...`` and ``RTCOMP replay ...``."""
+
+    cases: int
+    seed: int
+    jobs: int
+    diagnose: tuple[str, ...]
+    replay: tuple[str, ...]
+    timeout_s: float = 900.0
+    rivals: tuple[str, ...] = tuple(RIVALS)
+
+
+Progress = Callable[[str, int, int], None]
+"""Called with the step's name, how many of it are done, and of how many."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What came out."""
+
+    rows: list[Scored]
+    figures: list[Figure]
+    seen: list[Seen]
+    rivals: dict[str, list[Figure]]
+    notes: list[str]
+    seconds: float
+
+    def to_json(self, settings: Settings) -> dict[str, Any]:
+        """Return the content of ``trial.json``."""
+        return {
+            "version": __version__,
+            "cases": settings.cases,
+            "seed": settings.seed,
+            "seconds": self.seconds,
+            "figures": [f.to_json() for f in self.figures],
+            "smallest_seen": [
+                {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in asdict(s).items()}
+                for s in self.seen
+            ],
+            "rivals": {name: [f.to_json() for f in found] for name, found in self.rivals.items()},
+            "notes": self.notes,
+            "rows": [row.row() for row in self.rows],
+        }
+
+
+def trial(settings: Settings, out: Path, progress: Progress, keep: bool = False) -> Trial:
+    """Run a trial into the folder `out`; raise SealError where an answer is not what was sealed.
+
+    The unseen recordings are made only after the last diagnosis has ended; with `keep` they, the
+    recordings and the diagnoses stay.
+    """
+    started = time.perf_counter()
+    plans = plan(settings.cases, settings.seed)
+    drawn = []
+    with ProcessPoolExecutor(settings.jobs) as pool:
+        for case in pool.map(_make, plans, [out] * len(plans)):
+            drawn.append(case)
+            progress("draw", len(drawn), len(plans))
+    sealed = Sealed({case.plan.name: case.answer() for case in drawn})
+    sealed.publish(out / "commitments.json")
+    names = [case.plan.name for case in drawn]
+    del drawn
+    chosen = [r for r in settings.rivals if not missing(r)]
+    notes = [f"rival {r}: {RIVALS[r]} is not installed (extras group rivals)" for r in settings.rivals
+             if r not in chosen]  # fmt: skip
+    with Processes(settings.jobs) as processes:
+        said = processes.run(
+            [_diagnosis(settings, out, n) for n in names], _count(progress, "diagnose", names)
+        )
+        others = {
+            r: processes.run([_rival(r, settings, out, n) for n in names], _count(progress, r, names))
+            for r in chosen
+        }
+        if processes.running:
+            raise RuntimeError("a diagnosis still runs; the seal stays closed")
+        answers = sealed.open(out / "answers.json", out / "commitments.json")
+        cases = [Case.again(answers[name]) for name in names]
+        errors = _judge(settings, processes, out, cases, said, progress)
+    rows = [
+        score(case, outcome, *_read(out / "diagnoses" / case.plan.name, outcome), errors.get(case.plan.name))
+        for case, outcome in zip(cases, said, strict=True)
+    ]
+    rivals = {
+        r: figures(
+            [score(c, o, *_read(out / r / c.plan.name, o), None) for c, o in zip(cases, done, strict=True)],
+            gains=False,
+        )
+        for r, done in others.items()
+    }
+    notes += [f"{r.case.plan.name}: {r.fault}" for r in rows if r.fault]
+    done = Trial(rows, figures(rows), seen(rows), rivals, notes, time.perf_counter() - started)
+    _write(out, settings, done)
+    if not keep:
+        for folder in ("cases", "diagnoses", *chosen):
+            shutil.rmtree(out / folder)
+    return done
+
+
+def _make(chosen: Any, out: Path) -> Case:
+    """Draw a case and write what the diagnosis gets."""
+    case = draw(chosen)
+    folder = out / "cases" / case.plan.name
+    folder.mkdir(parents=True)
+    dump_yaml(folder / "stage.yaml", case.believed)
+    write_recording(folder / "train.csv.gz", case.run("train"), case.loop.resolution)
+    return case
+
+
+def _diagnosis(settings: Settings, out: Path, name: str) -> Task:
+    case, into = out / "cases" / name, out / "diagnoses" / name
+    command = [*settings.diagnose, str(case / "train.csv.gz"), "--stage", str(case / "stage.yaml")]
+    log = out / "diagnoses" / f"{name}.log"
+    return Task(name, (*command, "--out", str(into)), log, settings.timeout_s)
+
+
+def _rival(rival: str, settings: Settings, out: Path, name: str) -> Task:
+    result = out / rival / name / "diagnosis.json"
+    module = [sys.executable, "-m", "rtcomp.trial.rival", rival]
+    command = (*module, str(out / "cases" / name), str(result))
+    return Task(name, command, out / rival / f"{name}.log", settings.timeout_s)
+
+
+def _count(progress: Progress, step: str, names: Sequence[str]) -> Callable[[Outcome], None]:
+    done: list[str] = []
+
+    def each(outcome: Outcome) -> None:
+        done.append(outcome.name)
+        progress(step, len(done), len(names))
+
+    return each
+
+
+def _read(folder: Path, outcome: Outcome) -> tuple[Said | None, str]:
+    """Return what was said and "", or None and what went wrong."""
+    if outcome.timed_out:
+        return None, f"diagnosis ended after {outcome.seconds:.0f} s without an answer"
+    if outcome.status != 0:
+        return None, f"diagnosis ended with status {outcome.status}: {outcome.words or 'no word'}"
+    try:
+        return Said.read(folder / "diagnosis.json"), ""
+    except ValueError as error:
+        return None, str(error)
+
+
+def _judge(
+    settings: Settings,
+    processes: Processes,
+    out: Path,
+    cases: Iterable[Case],
+    said: Sequence[Outcome],
+    progress: Progress,
+) -> dict[str, Errors]:
+    """Make the unseen recordings and replay believed, diagnosed and exact stages on them."""
+    tasks: dict[str, Task] = {}
+    judged = [case for case, outcome in zip(cases, said, strict=True) if outcome.well]
+    for n, case in enumerate(judged):
+        name = case.plan.name
+        folder, into = out / "cases" / name, out / "diagnoses" / name
+        write_recording(folder / "unseen.csv.gz", case.run("unseen"), case.loop.resolution)
+        write_recording(folder / "bare.csv.gz", case.run("unseen", bare=True), case.loop.resolution)
+        dump_yaml(folder / "exact.yaml", exact_stage(case.bare, case.loop, case.believed))
+        for which, recording, stage in (
+            ("before", "unseen", folder / "stage.yaml"),
+            ("after", "unseen", into / "stage.yaml"),
+            ("oracle", "bare", folder / "exact.yaml"),
+        ):
+            key, result = f"{name}/{which}", into / f"{which}.csv"
+            command = [*settings.replay, str(folder / f"{recording}.csv.gz"), "--stage", str(stage)]
+            tasks[key] = Task(key, (*command, "--out", str(result)), into / f"{which}.log", REPLAY_S)
+        progress("unseen", n + 1, len(judged))
+    ended = processes.run(list(tasks.values()), _count(progress, "replay", list(tasks)))
+    well = {o.name for o in ended if o.well}
+    errors = {}
+    for case in judged:
+        keys = [f"{case.plan.name}/{which}" for which in ("before", "after", "oracle")]
+        if all(key in well for key in keys):
+            errors[case.plan.name] = Errors(*(_relative(Path(tasks[key].command[-1])) for key in keys))
+    return errors
+
+
+def _relative(path: Path) -> float:
+    """Return the relative force error of a replay: rms of the difference over rms of the motion side."""
+    with path.open(encoding="utf-8") as file:
+        head = next(csv.reader(file))
+    columns = (head.index("force_drive"), head.index("force_motion"))
+    table = np.loadtxt(path, delimiter=",", skiprows=1, usecols=columns)[EDGE_ROWS:-EDGE_ROWS]
+    return float(np.sqrt(np.mean((table[:, 0] - table[:, 1]) ** 2) / np.mean(table[:, 1] ** 2)))
+
+
+def _write(out: Path, settings: Settings, done: Trial) -> None:
+    text = json.dumps(done.to_json(settings), indent=1, allow_nan=False)
+    (out / "trial.json").write_text(text + "\n", encoding="utf-8")
+    with (out / "rows.csv").open("w", encoding="utf-8", newline="") as file:
+        rows = [row.row() for row in done.rows]
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
