@@ -69,7 +69,7 @@ def diagnose(
 
     with prepare_output(out, force) as work:
         with Steps(quiet=as_json) as steps:
-            found = run(stage, data, progress=steps.update, seed=seed)
+            found = run(stage, data, progress=lambda done, name: steps.update(name, done), seed=seed)
         found = replace(found, notes=list(dict.fromkeys([*notes, *found.notes])))
         text = to_json(found.to_json())
         write_text(work / "diagnosis.json", text + "\n")

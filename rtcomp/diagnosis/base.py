@@ -21,7 +21,9 @@ FIXED = 3
 """Columns before those of friction: mass, viscous, micro-damping."""
 
 
-def bounds_of(stage: Stage, size: int, slack: float = BELIEVED, released: frozenset[str] = frozenset()) -> Bounds:
+def bounds_of(
+    stage: Stage, size: int, slack: float = BELIEVED, released: frozenset[str] = frozenset()
+) -> Bounds:
     """Return the bounds of the base's coefficients.
 
     Mass, viscous and micro-damping stay within `slack` of the belief unless `released`; friction elements are

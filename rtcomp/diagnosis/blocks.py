@@ -6,6 +6,7 @@ All that is needed of each block is its Gram matrix, so that leaving a block out
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -33,7 +34,7 @@ class Blocks:
         a = columns / scale
         edges = np.searchsorted(block, np.arange(count + 1))
         gram, cross, power = [], [], []
-        for first, last in zip(edges[:-1], edges[1:], strict=True):
+        for first, last in pairwise(edges):
             part, target = a[first:last], y[first:last]
             gram.append(part.T @ part)
             cross.append(part.T @ target)
@@ -41,7 +42,7 @@ class Blocks:
         return cls(np.array(gram), np.array(cross), np.array(power), scale)
 
     def solve(self, use: np.ndarray, bounds: Bounds | None = None) -> Floats:
-        """Return the scaled coefficients (p,) fitted on the blocks where `use` (K,) is true, within bounds."""
+        """Return the scaled coefficients (p,) fitted on the blocks where `use` (K,) is true."""
         gram, cross = self.gram[use].sum(axis=0), self.cross[use].sum(axis=0)
         gram = gram + 1e-9 * np.trace(gram) / gram.shape[0] * np.eye(gram.shape[0])
         if bounds is None:

@@ -123,21 +123,32 @@ def effect_of(entry: Entry) -> Effect:
 def _constant(s: Scene) -> list[Column]:
     one = -np.ones_like(s.x)
     return [
-        Column("drive-offset", lambda: [one], lambda c: {"name": "drive-offset", "offset": c[0] / s.force_constant})
+        Column(
+            "drive-offset",
+            lambda: [one],
+            lambda c: {"name": "drive-offset", "offset": c[0] / s.force_constant},
+        )
     ]
 
 
 def _by_speed(s: Scene) -> list[Column]:
     viscous = max(s.fitted.ledger.stage.mechanics.viscous, 1e-12)
     return [
-        Column("viscous-friction", lambda: [s.v], lambda c: {"name": "viscous-friction", "coefficient": c[0]}),
         Column(
-            "quadratic-drag", lambda: [np.abs(s.v) * s.v], lambda c: {"name": "quadratic-drag", "coefficient": c[0]}
+            "viscous-friction", lambda: [s.v], lambda c: {"name": "viscous-friction", "coefficient": c[0]}
+        ),
+        Column(
+            "quadratic-drag",
+            lambda: [np.abs(s.v) * s.v],
+            lambda c: {"name": "quadratic-drag", "coefficient": c[0]},
         ),
         Column(
             "asymmetric-viscous-friction",
             lambda: [np.abs(s.v)],
-            lambda c: {"name": "asymmetric-viscous-friction", "ratio": float(np.clip(c[0] / viscous, -50, 50))},
+            lambda c: {
+                "name": "asymmetric-viscous-friction",
+                "ratio": float(np.clip(c[0] / viscous, -50, 50)),
+            },
         ),
     ]
 
@@ -158,7 +169,9 @@ def _waves(c: Floats) -> tuple[float, float]:
     return float(np.hypot(c[0], c[1])), float(np.arctan2(c[1], c[0]))
 
 
-def _periodic(s: Scene, name: str, weight: Floats, sign: float, entry: Callable[[Floats, float], Entry]) -> list[Column]:
+def _periodic(
+    s: Scene, name: str, weight: Floats, sign: float, entry: Callable[[Floats, float], Entry]
+) -> list[Column]:
     def column(period: float) -> Column:
         k = 2 * np.pi / period
 
@@ -172,7 +185,7 @@ def _periodic(s: Scene, name: str, weight: Floats, sign: float, entry: Callable[
 
 def _periods(s: Scene, weight: Floats, peaks: int = 4) -> list[float]:
     """Return periods (m) worth trying: the longest ones, and those that stand out of the residual."""
-    found = [s.span / n for n in (0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 2.8)]
+    found = [s.span / n for n in (1.0, 1.3, 1.7, 2.2, 2.8)]
     step = float(np.median(np.abs(np.diff(s.x)))) or s.span / 1000
     most = min(150.0, s.span / (6 * step))
     n = np.arange(2.5, max(most, 3.0), 0.2)
@@ -212,7 +225,12 @@ def _friction_along(s: Scene) -> list[Column]:
 
     def entry(c: Floats, period: float) -> Entry:
         amplitude, phase = _waves(c)
-        return {"name": "position-dependent-friction", "amplitude": min(amplitude, 0.9), "period": period, "phase": phase}
+        return {
+            "name": "position-dependent-friction",
+            "amplitude": min(amplitude, 0.9),
+            "period": period,
+            "phase": phase,
+        }
 
     waves = _periodic(s, "position-dependent-friction", force, 1.0, entry)
     slope = Column(
@@ -231,7 +249,8 @@ def _tone(s: Scene) -> list[Column]:
     rate = s.motion.rate / s.motion.thinning
     spectrum = np.abs(np.fft.rfft(part * np.hanning(rows), 4 * rows)) ** 2
     frequency = np.fft.rfftfreq(4 * rows, 1 / rate)
-    spectrum[(frequency < 3.0 * rate / rows) | (frequency > s.motion.cut * 1.2)] = 0.0
+    lowest = max(10.0 * rate / rows, 1.0)  # slower, it is no tone but part of the motion's own band
+    spectrum[(frequency < lowest) | (frequency > s.motion.cut * 1.2)] = 0.0
     # A line stands out of its neighbourhood, whatever the motion puts around it.
     width = 201
     around = np.convolve(spectrum, np.ones(width) / width, mode="same") + 1e-300
@@ -264,28 +283,36 @@ def _drift_of_level(s: Scene) -> list[Column]:
         return Column(
             "friction-drift",
             lambda: [force * -np.expm1(-s.time / tau)],
-            lambda c: {"name": "friction-drift", "change": float(np.clip(c[0], -0.9, 5.0)), "time_constant": tau},
+            lambda c: {
+                "name": "friction-drift",
+                "change": float(np.clip(c[0], -0.9, 5.0)),
+                "time_constant": tau,
+            },
         )
 
     return [column(total * part) for part in (0.05, 0.15, 0.4, 1.0, 3.0)]
 
 
-KNOTS = 15
-"""Knots of a force that depends on position in a shape that nothing else explains."""
+KNOTS = (12, 24, 48)
+"""Numbers of knots tried for a force that depends on position in a shape that nothing else explains."""
 
 
 def _any_shape(s: Scene) -> list[Column]:
     low, high = s.motion.stroke
-    knots = np.linspace(low, high, KNOTS)
 
-    def columns() -> list[Floats]:
-        return [-np.interp(s.x, knots, one) for one in np.eye(KNOTS)]
+    def column(count: int) -> Column:
+        knots = np.linspace(low, high, count)
 
-    def compose(c: Floats) -> Entry:
-        values = [float(v) for v in c - c.mean()]
-        return {"name": "position-force", "knots": [float(k) for k in knots], "values": values}
+        def columns() -> list[Floats]:
+            return [-np.interp(s.x, knots, one) for one in np.eye(count)]
 
-    return [Column("position-force", columns, compose)]
+        def compose(c: Floats) -> Entry:
+            values = [float(v) for v in c]
+            return {"name": "position-force", "knots": [float(k) for k in knots], "values": values}
+
+        return Column("position-force", columns, compose)
+
+    return [column(count) for count in KNOTS]
 
 
 def _end_stop(s: Scene) -> list[Column]:
@@ -313,7 +340,10 @@ def _drive(s: Scene) -> list[Point]:
     points += [{"name": "drive-saturation", "limit": w * largest} for w in (0.45, 0.6, 0.75, 0.88)]
     points += [{"name": "drive-gain", "gain": g} for g in (0.7, 0.85, 1.15, 1.4)]
     for n in (0.5, 1.0, 2.0, 4.0, 8.0):
-        points += [{"name": "drive-delay", "delay": n * period}, {"name": "drive-lag", "time_constant": n * period}]
+        points += [
+            {"name": "drive-delay", "delay": n * period},
+            {"name": "drive-lag", "time_constant": n * period},
+        ]
         points += [{"name": "sensor-delay", "delay": n * period}]
     return [Point(p) for p in points]
 
@@ -332,12 +362,14 @@ def _presliding(s: Scene) -> list[Point]:
     points += [{"name": "non-congruent-friction", "softening": a} for a in (0.05, 0.2, 0.5)]
     points += [{"name": "load-dependent-friction", "coefficient": a} for a in (0.03, 0.15)]
     points += [
-        {"name": "stiction-ageing", "growth": g, "distance": d * reach} for g in (0.05, 0.2) for d in (0.1, 1.0)
+        {"name": "stiction-ageing", "growth": g, "distance": d * reach}
+        for g in (0.05, 0.2)
+        for d in (0.1, 1.0)
     ]
     points += [
         {"name": "creep", "fraction": f, "time_constant": t} for f in (0.05, 0.2) for t in (0.03, 0.3, 3.0)
     ]
-    points += [{"name": "backlash", "gap": g * reach} for g in (0.02, 0.1, 0.4, 1.5)]
+    points += [{"name": "backlash", "gap": g * reach} for g in (0.03, 0.1, 0.25, 0.6, 1.5)]
     return [Point(p) for p in points]
 
 
@@ -355,7 +387,9 @@ def _inertial(s: Scene) -> list[Point]:
 
 def _sensing(s: Scene) -> list[Point]:
     points: list[Entry] = []
-    noise = max(float(np.hypot(s.fitted.ledger.stage.sensor.noise, s.fitted.ledger.stage.sensor.resolution)), 1e-9)
+    noise = max(
+        float(np.hypot(s.fitted.ledger.stage.sensor.noise, s.fitted.ledger.stage.sensor.resolution)), 1e-9
+    )
     for period in _cyclic_periods(s):
         points += [
             {"name": "sensor-periodic-error", "amplitude": a * noise, "period": period, "phase": p}

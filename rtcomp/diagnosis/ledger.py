@@ -14,11 +14,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from rtcomp.diagnosis.blocks import Blocks
 from rtcomp.diagnosis.motion import BLOCKS, UNSEEN, Motion, Strip
 from rtcomp.kernels import Floats, call_effect, compiled
 from rtcomp.physics import Effect, Place
+from rtcomp.physics.coupled import LOAD_SHARE
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.physics.rows import new_rows
 from rtcomp.physics.wires import SENSED, STEP, TIME
@@ -26,6 +28,7 @@ from rtcomp.stage.balance import forces
 from rtcomp.stage.stage import Stage
 
 MASS, VISCOUS, MICRO = "mass", "viscous", "micro_damping"
+PARTS = 8
 GRID = 14
 """Reaches of the grid where the believed friction is not a short list of elements."""
 
@@ -52,8 +55,13 @@ class Ledger:
 
     def __post_init__(self) -> None:
         self.block = self.motion.block()
+        sensor = self.stage.sensor
+        self.grain = 1.5 * sensor.noise + 0.5 * sensor.resolution
         self.seen = np.ones(BLOCKS, dtype=np.bool_)
         self.seen[list(UNSEEN)] = False
+        friction = self.stage.friction
+        bank = friction.elements if isinstance(friction, MaxwellSlip) else [(1.0, float(self.reaches.mean()))]
+        self._believed = np.array([k for k, _ in bank]), np.array([r for _, r in bank])
         self._plain: System | None = None
 
     def system(self, effects: Sequence[Effect] = (), adders: Sequence[Effect] = ()) -> System:
@@ -92,6 +100,8 @@ class Ledger:
         drive = [e for e in effects if e.place is Place.DRIVE]
         modifiers = [e for e in effects if e.place is Place.FRICTION]
         others = [e for e in effects if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
+        gap = sum(float(e.values["gap"]) for e in effects if e.name == "backlash")
+        others = [e for e in others if e.name != "backlash"]
         speed = self.stage.mechanics.micro_damping_speed
         sides, tables = [], []
         for strip in self.motion.strips:
@@ -99,8 +109,13 @@ class Ledger:
             given = self._given(strip, drive, x, v, a)
             f = forces(self.stage, [*modifiers, *others], strip.time, x, v, a, strip.voltage)
             sides.append(given + f.push - f.friction)
-            share = f.mass / self.stage.mass
-            columns = [a * share, v, v * np.exp(-((v / speed) ** 2))]
+            moved = a * f.mass / self.stage.mass
+            if gap > 0.0:
+                x = behind_play(x, gap, *self._believed)
+                v, rest = derivatives(x, self.motion.period)
+                moved = moved + LOAD_SHARE * (rest - a)
+                a = rest
+            columns = [moved, v, v * np.exp(-((v / speed) ** 2))]
             columns += [self._element(strip, modifiers, r, x, v, a) for r in self.reaches]
             tables.append(np.column_stack(columns))
         names = (MASS, VISCOUS, MICRO, *(f"reach {r:.3g}" for r in self.reaches))
@@ -110,9 +125,10 @@ class Ledger:
     def _given(self, strip: Strip, drive: Sequence[Effect], x: Floats, v: Floats, a: Floats) -> Floats:
         chain = sorted([*self._drive(), *drive], key=lambda e: e.order)
         held = np.append(strip.voltage[:1], strip.voltage[:-1])
-        after = forces(self.stage, chain, strip.time, x, v, a, strip.voltage)
-        before = forces(self.stage, chain, strip.time, x, v, a, held)
-        return 0.5 * (before.drive + after.drive + before.push + after.push)
+        # What the drive remembers changes its force within a row; the mean over the row is what moved.
+        parts = PARTS if any(e.initial_state().size for e in chain) else 1
+        f = forces(self.stage, chain, strip.time, x, v, a, held, parts=parts)
+        return 0.5 * (f.drive + np.append(f.drive[1:], f.drive[-1:])) + f.push
 
     def _drive(self) -> list[Effect]:
         chain = [e for e in self.stage.chain if e.place is Place.DRIVE]
@@ -122,21 +138,60 @@ class Ledger:
         self, strip: Strip, modifiers: Sequence[Effect], reach: float, x: Floats, v: Floats, a: Floats
     ) -> Floats:
         chain = [*sorted(modifiers, key=lambda e: e.order), MaxwellSlip([(1.0, float(reach))])]
-        alone = forces(self.stage, chain, strip.time, x, v, a, strip.voltage).friction
+        alone = forces(self.stage, chain, strip.time, x, v, a, strip.voltage, self.grain).friction
         if not modifiers:
             return alone
-        return alone - forces(self.stage, chain[:-1], strip.time, x, v, a, strip.voltage).friction
+        rest = forces(self.stage, chain[:-1], strip.time, x, v, a, strip.voltage, self.grain)
+        return alone - rest.friction
 
 
-def kinematics(
-    strip: Strip, period: float, effects: Sequence[Effect] = ()
-) -> tuple[Floats, Floats, Floats]:
+def kinematics(strip: Strip, period: float, effects: Sequence[Effect] = ()) -> tuple[Floats, Floats, Floats]:
     """Return true position, velocity and acceleration (SI) behind a strip, sensor effects undone."""
     x = true_position(effects, strip.time, strip.position)
+    return x, *derivatives(x, period)
+
+
+def derivatives(x: Floats, period: float) -> tuple[Floats, Floats]:
+    """Return first and second central differences of positions (m) in rows of `period` (s)."""
     v, a = np.zeros_like(x), np.zeros_like(x)
     v[1:-1] = (x[2:] - x[:-2]) / (2 * period)
     a[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / period**2
-    return x, v, a
+    return v, a
+
+
+@compiled
+def behind_play(x: Floats, gap: float, stiffness: Floats, reaches: Floats) -> Floats:
+    """Return the position (m) of a load with friction that `x` drives through a play of +-`gap` (m).
+
+    Slow motion: in contact the load goes along as long as its friction, of these elements, holds it
+    against the end; where friction has relaxed it stays behind until the other end meets it.
+    """
+    out = np.empty_like(x)
+    z = np.zeros_like(reaches)
+    y, side = x[0], 0.0
+    for k in range(x.size):
+        if side == 0.0:
+            if x[k] - y >= gap:
+                side = 1.0
+            elif x[k] - y <= -gap:
+                side = -1.0
+        if side != 0.0:
+            move = x[k] - side * gap - y
+            before = after = 0.0
+            for i in range(z.size):
+                before += stiffness[i] * z[i]
+                after += stiffness[i] * min(max(z[i] + move, -reaches[i]), reaches[i])
+            part = 1.0
+            if after * side < 0.0:
+                part = before / (before - after) if before != after else 0.0
+                part = min(max(part, 0.0), 1.0)
+            for i in range(z.size):
+                z[i] = min(max(z[i] + part * move, -reaches[i]), reaches[i])
+            y += part * move
+            if part < 1.0:
+                side = 0.0
+        out[k] = y
+    return out
 
 
 def true_position(effects: Sequence[Effect], time: Floats, measured: Floats) -> Floats:
@@ -148,7 +203,10 @@ def true_position(effects: Sequence[Effect], time: Floats, measured: Floats) -> 
     rows[:, TIME], rows[:, SENSED] = time, measured
     rows[:, STEP] = np.gradient(time)
     for effect in sensors:
-        assert effect.inverse is not None, f"{effect.name} cannot be undone"
+        if effect.inverse is None:
+            late = float(effect.values.get("delay", 0.0))
+            rows[:, SENSED] = CubicSpline(time, rows[:, SENSED])(np.minimum(time + late, time[-1]))
+            continue
         p, state = np.append(effect.vector(), 0.0), np.append(effect.initial_state(), 0.0)
         _undo(effect.inverse.address, p, state, rows)
     return np.ascontiguousarray(rows[:, SENSED])
@@ -171,4 +229,3 @@ def grid_of(stage: Stage, scale: float = 1.0) -> Floats:
         reach = [r for _, r in friction.elements]
         return np.geomspace(0.7 * min(reach), 1.4 * max(reach), GRID) * scale
     return np.geomspace(1e-7, 1e-4, GRID) * scale
-

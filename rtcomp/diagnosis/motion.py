@@ -52,7 +52,9 @@ class Motion:
     @property
     def stroke(self) -> tuple[float, float]:
         """Lowest and highest position (m)."""
-        return min(float(s.position.min()) for s in self.strips), max(float(s.position.max()) for s in self.strips)
+        return min(float(s.position.min()) for s in self.strips), max(
+            float(s.position.max()) for s in self.strips
+        )
 
     @property
     def seconds(self) -> float:
@@ -134,7 +136,7 @@ def _bandwidth(stage: Stage, strips: Sequence[Strip], rate: float) -> float:
     most = min(0.15 * rate, 150.0)
     if noise == 0.0 or force == 0.0:
         return most
-    # rms of m a up to B, white position noise of this size at this rate: m (2 pi B)^2 noise sqrt(B / (2.5 rate))
+    # rms of m a up to B under white position noise at this rate: m (2 pi B)^2 noise sqrt(B / (2.5 rate))
     cuts = np.geomspace(min(10.0, most), most, 60)
     disturbed = stage.mass * (2 * np.pi * cuts) ** 2 * noise * np.sqrt(cuts / (2.5 * rate))
     quiet = cuts[disturbed < 0.004 * force]

@@ -1,4 +1,4 @@
-"""Refinement: the parameters of the named entries by nonlinear least squares, the base refitted with each try."""
+"""Refinement: parameters of named entries by nonlinear least squares, the base refitted with each try."""
 
 from __future__ import annotations
 
@@ -26,6 +26,8 @@ class Knob:
     entry: int
     parameter: Parameter
     step: float
+    most: float | None = None
+    """Largest value that this recording can tell of; None where the parameter's own range is all."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,9 @@ def knobs_of(entries: Sequence[Entry], motion: Motion, which: Sequence[int] | No
                 step = 0.002 * (high - low)
             if step == 0.0:
                 continue
-            found.append(Knob(i, parameter, step))
+            # A wave longer than the stroke is a slope or an offset by another name.
+            most = 1.2 * (high - low) if parameter.name == "period" else None
+            found.append(Knob(i, parameter, step, most))
     return found
 
 
@@ -83,7 +87,8 @@ def at(entries: Sequence[Entry], knobs: Sequence[Knob], moved: Floats) -> list[E
         before = float(out[knob.entry][p.name])  # type: ignore[arg-type]
         if p.low >= 0.0 and p.name not in ("amplitude",):
             value = max(value, 0.2 * before)  # sizes and times do not change sign
-        out[knob.entry][p.name] = float(np.clip(value, max(p.low, -1e300), min(p.high, 1e300)))
+        high = min(p.high, 1e300 if knob.most is None else knob.most)
+        out[knob.entry][p.name] = float(np.clip(value, max(p.low, -1e300), high))
     return out
 
 

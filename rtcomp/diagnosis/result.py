@@ -126,7 +126,7 @@ class Candidate:
 
     name: str
     gain: float
-    """Part of the held-out mismatch (squared, above the floor) it explains, alone beside the refitted stage."""
+    """Part of the left-out mismatch (squared) that it explains, alone beside the refitted stage."""
     z: float
     """That gain over its standard error."""
     observable: bool

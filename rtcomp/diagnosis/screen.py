@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtcomp.diagnosis.base import Fitted
 from rtcomp.diagnosis.candidates import Column, Entry, Point, Scene, effect_of, searches
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats

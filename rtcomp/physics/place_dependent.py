@@ -8,7 +8,7 @@ from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.drive import PERIOD, PHASE
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.wires import POSITION, SCALE
+from rtcomp.physics.wires import POSITION, REACH
 
 
 @effect_kernel
@@ -16,7 +16,7 @@ def position_dependent_friction(p: Floats, s: Floats, w: Floats) -> None:
     """p: amplitude (1), period (m), phase (rad), slope (1/m)."""
     x = w[POSITION]
     factor = 1.0 + p[0] * math.sin(2.0 * math.pi * x / p[1] + p[2]) + p[3] * x
-    w[SCALE] *= max(factor, 0.0)  # friction never drives
+    w[REACH] *= max(factor, 1e-3)  # friction never drives
 
 
 @register
@@ -32,8 +32,8 @@ class PositionDependentFriction(Effect):
         Parameter("slope", "1/m", -1e6, 1e6, "relative growth along the stroke", 0.0),
     )
     kernel = position_dependent_friction
-    says = "friction is higher in some places than in others: preload, wear, dirt"
-    equation = "F <- F (1 + a sin(2 pi x / period + phase) + slope x)"
+    says = "contacts yield later in some places than in others: preload, wear, dirt"
+    equation = "yield <- yield (1 + a sin(2 pi x / period + phase) + slope x)"
     source = (
         "Popovic, Goldenberg (1998), IEEE Trans. Robotics and Automation 14(1), spectral friction in position"
     )

@@ -84,7 +84,8 @@ def advance(z: Floats, step: float, reach: float, up: float, down: float, soften
         if gone >= whole:
             z[COUNT] = n - 2
             continue
-        part = virgin(gone / span, shape) / virgin(whole / span, shape)
+        full = virgin(whole / span, shape)
+        part = virgin(gone / span, shape) / full if full > 1e-12 else gone / whole
         z[H] = force + (z[AT + DEPTH + n - 2] - force) * part
         break
     return float(z[H])

@@ -85,13 +85,17 @@ def library(folder: Path) -> Library:
     keep = np.linspace(edge, x.size - edge - 1, min(ROWS, x.size - 2 * edge)).astype(int)
     given = base[keep] / np.sqrt(np.mean(base[keep] ** 2, axis=0))
     columns = np.column_stack([smooth(c)[keep] for _, c in items])
+    whole = np.sqrt(np.mean(columns**2, axis=0))
     columns -= given @ np.linalg.lstsq(given, columns, rcond=1e-8)[0]
-    columns /= np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-300)
+    alone = np.sqrt(np.mean(columns**2, axis=0))
+    # Of what retuning takes up almost wholly, only rounding would be left to choose.
+    kept = np.flatnonzero(alone > 0.02 * whole)
+    columns = columns[:, kept] / alone[kept]
     left = mismatch[keep] - given @ np.linalg.lstsq(given, mismatch[keep], rcond=1e-8)[0]
     better = believed + np.linalg.lstsq(base[keep], mismatch[keep], rcond=1e-12)[0]
     keys = ("mass", "viscous", "friction.level", "micro_damping")
     moved = tuple((key, float(believed[i]), float(better[i])) for i, key in enumerate(keys))
-    return Library(left, columns, tuple(name for name, _ in items), moved)
+    return Library(left, columns, tuple(items[int(i)][0] for i in kept), moved)
 
 
 @compiled

@@ -64,7 +64,7 @@ def sindy(table: Library) -> list[str]:
     from pysindy.optimizers import STLSQ, EnsembleOptimizer
 
     size = float(np.sqrt(np.mean(table.force**2)))
-    single = STLSQ(threshold=0.1 * size, alpha=1e-6 * table.force.size)
+    single = STLSQ(threshold=0.1 * size, alpha=0.01 * table.force.size)
     np.random.seed(0)  # the ensemble draws from numpy's global generator
     ensemble = EnsembleOptimizer(single, bagging=True, n_models=20)
     ensemble.fit(table.columns, table.force.reshape(-1, 1))

@@ -70,7 +70,7 @@ class Said:
                 tuple(n for names, _ in effects if (n := tuple(x for x in names if x != UNEXPLAINED))),
                 data["verdict"] == UNEXPLAINED or any(UNEXPLAINED in names for names, _ in effects),
                 tuple(sorted(moved)),
-                {names[0]: _intervals(p) for names, p in effects if names},
+                {names[0]: _intervals(p) for names, p in effects if names and names[0] != UNEXPLAINED},
                 {name: (float(r["to"]), float(r["low"]), float(r["high"])) for name, r in retuned.items()},
             )
         except (KeyError, TypeError, AttributeError, IndexError, OSError) as error:

@@ -1,0 +1,258 @@
+"""The whole diagnosis: refit, look for the place, name, extend, judge on what was not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from rtcomp.diagnosis.base import Fitted, fit_base
+from rtcomp.diagnosis.candidates import Entry
+from rtcomp.diagnosis.decide import ABOVE_FLOOR, Choice, Decision, decide
+from rtcomp.diagnosis.experiment import next_experiment
+from rtcomp.diagnosis.extend import extended_stage, level_and_reach
+from rtcomp.diagnosis.floor import floor_errors
+from rtcomp.diagnosis.locate import locate
+from rtcomp.diagnosis.motion import UNSEEN, Motion, prepare
+from rtcomp.diagnosis.refine import intervals
+from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
+from rtcomp.errors import RtcompError
+from rtcomp.kernels import Floats
+from rtcomp.physics import catalogue, entries
+from rtcomp.physics.maxwell_slip import MaxwellSlip
+from rtcomp.recording.reader import Recording
+from rtcomp.stage.balance import force_balance
+from rtcomp.stage.stage import Stage
+
+NEGLIGIBLE = 0.006
+"""Relative force error up to which a recording is held to agree, whatever its noise promises."""
+MOVED = 0.02
+"""Relative change of a parameter that is worth reporting."""
+UNSEEABLE = ("sensor-scale",)
+"""Entries that no recording of position and voltage shows: they scale everything."""
+
+Progress = Callable[[float, str], None]
+
+
+def diagnose(
+    stage: Stage,
+    recordings: Sequence[Recording],
+    *,
+    progress: Progress | None = None,
+    seed: int = 0,
+) -> Diagnosis:
+    """Say where `stage` and `recordings` (of one rate) differ, what is missing, and what it explains."""
+    say: Progress = progress or (lambda _part, _what: None)
+    say(0.0, "balance")
+    motion = prepare(stage, recordings)
+    base = fit_base(stage, motion)
+    retuned_stage = extended_stage(stage, base, [])
+    say(1.0, "balance")
+    floor = floor_errors(retuned_stage, base, motion, seed + 1)
+    power = float(base.system.blocks.power[base.ledger.seen].sum())
+    least = np.maximum(floor, NEGLIGIBLE**2 / ABOVE_FLOOR * base.system.blocks.power[base.ledger.seen])
+    decision = decide(stage, motion, base, least, say)
+    final = decision.refined.fitted
+    named = [dict(e) for e in decision.refined.entries]
+    extended = extended_stage(stage, final, named)
+    say(0.2, "judge")
+    fit = Fit(
+        _held_out(stage, motion),
+        _held_out(retuned_stage, motion),
+        _held_out(extended, motion),
+        float(np.sqrt(floor.sum() / power)),
+    )
+    if named and fit.after > 1.02 * fit.before:
+        # What the ledger gains must hold in the stage itself; else it is not offered as an explanation.
+        named, decision.choices, extended, final = [], [], retuned_stage, base
+        fit = Fit(fit.before, fit.retuned, fit.retuned, fit.floor)
+    say(0.4, "locate")
+    where = locate(motion, base.residual, final.residual if named else None, seed)
+    effects = _effects(decision, named, base, final, least)
+    retuned = _retuned(stage, final)
+    verdict = _verdict(effects, base, floor, least, fit)
+    if verdict == "consistent":
+        where = []
+        extended = retuned_stage
+    elif verdict == "unexplained" and not effects:
+        effects = [Named(("unexplained",), 1.0, {}, 1.0)]
+    say(0.8, "locate")
+    experiment = None
+    for choice in decision.choices:
+        if named and len(choice.names) > 1:
+            experiment = _tell_apart(choice, named, stage, final, motion)
+            break
+    say(1.0, "done")
+    return Diagnosis(
+        verdict,
+        where,
+        retuned if verdict != "consistent" else [],
+        effects,
+        fit,
+        _not_observable(decision),
+        extended,
+        experiment,
+        _candidates(decision, base),
+        _notes(motion, recordings),
+        motion.plain([s.time for s in motion.strips]),
+        base.residual,
+        final.residual,
+        np.isin(base.ledger.block, UNSEEN).astype(np.float64),
+    )
+
+
+def _held_out(stage: Stage, motion: Motion) -> float:
+    """Return the relative force error of a whole stage on what nothing was fitted to or chosen by."""
+    off = over = 0.0
+    block = motion.block()
+    start = 0
+    for strip in motion.strips:
+        balance = force_balance(stage, strip.time, strip.position, strip.voltage, motion.cut)
+        rows = slice(motion.edge, -motion.edge or None, motion.thinning)
+        drive, needed = balance.force_drive[rows], balance.force_motion[rows]
+        unseen = np.isin(block[start : start + drive.size], UNSEEN)
+        start += drive.size
+        off += float(np.sum((drive - needed)[unseen] ** 2))
+        over += float(np.sum(needed[unseen] ** 2))
+    return float(np.sqrt(off / over)) if over > 0 else 0.0
+
+
+def _effects(
+    decision: Decision, named: list[Entry], base: Fitted, final: Fitted, floor: Floats
+) -> list[Named]:
+    if not named:
+        return []
+    excess = max(float(base.errors.sum() - floor.sum()), 1e-300)
+    spans = intervals(decision.refined)
+    found = []
+    for i, (entry, choice) in enumerate(zip(named, decision.choices, strict=True)):
+        values = {}
+        for parameter in catalogue.entry(str(entry["name"])).parameters:
+            value = entry.get(parameter.name)
+            if isinstance(value, int | float):
+                low, high = spans.get((i, parameter.name), (float(value), float(value)))
+                values[parameter.name] = Value(float(value), low, high, parameter.unit)
+        share = float(np.clip(choice.gain / excess, 0.0, 1.0))
+        found.append(Named(tuple(choice.names), choice.probability, values, share, _experiment_of(choice)))
+    found.sort(key=lambda e: -e.share)
+    left = float(final.errors.sum() - floor.sum()) / excess
+    if left > 0.2 and float(final.errors.sum()) > 2.0 * ABOVE_FLOOR * float(floor.sum()):
+        found.append(Named(("unexplained",), 1.0, {}, left))
+    return found
+
+
+def _experiment_of(choice: Choice) -> str:
+    if len(choice.names) < 2:
+        return ""
+    return "; ".join(f"{n}: {catalogue.entry(n).experiment}" for n in choice.names)
+
+
+def _verdict(effects: list[Named], base: Fitted, floor: Floats, least: Floats, fit: Fit) -> Verdict:
+    if effects:
+        return "missing-physics"
+    left = float(base.errors.sum())
+    if left > ABOVE_FLOOR * float(least.sum()):
+        return "unexplained"
+    if fit.before > 1.25 * fit.retuned and fit.before > NEGLIGIBLE:
+        return "retuned"
+    return "consistent" if left < 100 * float(floor.sum()) else "unexplained"
+
+
+def _retuned(believed: Stage, final: Fitted) -> list[Retuned]:
+    """Return the believed parameters that the fit moved, with jackknife intervals over blocks."""
+    seen = final.ledger.seen
+    members = np.flatnonzero(seen)
+    sets = [final.coefficients]
+    for k in members:
+        others = seen.copy()
+        others[k] = False
+        sets.append(final.system.blocks.coefficients(others, final.bounds))
+    reaches = final.ledger.reaches
+    rows = []
+    for c in sets:
+        elements = [(float(k), float(r)) for k, r in zip(c[3 : 3 + reaches.size], reaches, strict=True)]
+        level, reach = level_and_reach(elements)
+        rows.append([c[0], c[1], c[2], level, reach])
+    table = np.array(rows)
+    count = members.size
+    spread = np.sqrt((count - 1) / count * np.sum((table[1:] - table[1:].mean(axis=0)) ** 2, axis=0))
+    m = believed.mechanics
+    friction = believed.friction
+    own = level_and_reach(friction.elements) if isinstance(friction, MaxwellSlip) else (0.0, 0.0)
+    before = [m.mass, m.viscous, m.micro_damping, *own]
+    names = ("mass", "viscous", "micro_damping", "friction.level", "friction.reach")
+    units = ("kg", "N s/m", "N s/m", "N", "m")
+    found = []
+    for name, unit, old, new, sd in zip(names, units, before, table[0], spread, strict=True):
+        half = 2.26 * float(sd)
+        if old > 0 and abs(new / old - 1) > MOVED and abs(new - old) > half:
+            found.append(
+                Retuned(name, float(old), Value(float(new), float(new - half), float(new + half), unit))
+            )
+    return found
+
+
+def _tell_apart(
+    choice: Choice, named: list[Entry], stage: Stage, final: Fitted, motion: Motion
+) -> Experiment | None:
+    first, second = choice.names[0], choice.names[1]
+    at = next(i for i, e in enumerate(named) if e["name"] == first)
+    other = _like(named[at], second, stage)
+    if other is None:
+        return None
+    swapped = [*named[:at], other, *named[at + 1 :]]
+    try:
+        return next_experiment(
+            extended_stage(stage, final, named),
+            extended_stage(stage, final, swapped),
+            (first, second),
+            motion,
+        )
+    except RtcompError:
+        return None
+
+
+def _like(entry: Entry, name: str, stage: Stage) -> Entry | None:
+    """Return the entry of another name that acts alike at first sight; None where there is no such rule."""
+    size = {k: v for k, v in entry.items() if k != "name"}
+    try:
+        if name in ("drive-delay", "sensor-delay") and "delay" in size:
+            return {"name": name, "delay": size["delay"]}
+        if name == "drive-lag" and "delay" in size:
+            return {"name": name, "time_constant": size["delay"]}
+        if name in ("constant-force", "gravity") and "offset" in size:
+            return {"name": name, "force": float(size["offset"]) * stage.force_constant}  # type: ignore[arg-type]
+        if name == "torque-ripple" and {"period", "phase"} <= set(size):
+            return {"name": name, "amplitude": 0.1, "period": size["period"], "phase": size["phase"]}
+    except (TypeError, ValueError):
+        return None
+    return None
+
+
+def _candidates(decision: Decision, base: Fitted) -> list[Candidate]:
+    found = []
+    for s in decision.first_look:
+        gained = base.errors - s.errors
+        scatter = float(gained.std(ddof=1) * np.sqrt(gained.size)) or 1e-300
+        gain = max(s.gain(base.errors), decision.first_refined.get(s.name, -np.inf))
+        found.append(Candidate(s.name, gain, float(gained.sum()) / scatter, True))
+    found += [Candidate(n, 0.0, 0.0, False) for n in _not_observable(decision)]
+    return sorted(found, key=lambda c: -c.gain)
+
+
+def _not_observable(decision: Decision) -> list[str]:
+    """Return the entries that this recording could not have shown."""
+    if not decision.first_look:
+        return list(UNSEEABLE)
+    tried = {s.name for s in decision.first_look}
+    models = {"dahl", "gms", "leuven", "lugre", "maxwell-slip", "modified-leuven", "micro-damping"}
+    alike = {"constant-force", "gravity", "back-emf", "sensor-noise", "sensor-resolution"}
+    return [e.name for e in entries() if e.name not in tried | models | alike]
+
+
+def _notes(motion: Motion, recordings: Sequence[Recording]) -> list[str]:
+    notes = [f"forces are compared below {motion.cut:.3g} Hz"]
+    rows = sum(len(r) for r in recordings)
+    if motion.seconds * motion.rate < 0.9 * rows * motion.rate / recordings[0].rate_hz:
+        notes.append(f"of {rows} rows, windows of {motion.seconds:.3g} s in all were looked at")
+    return notes

@@ -1,0 +1,85 @@
+"""The next experiment: of the manoeuvres within stroke and force, the one that best tells two stages apart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rtcomp.control.reference_settings import reference_settings
+from rtcomp.control.references import build_reference, check
+from rtcomp.diagnosis.motion import Motion
+from rtcomp.diagnosis.result import Experiment
+from rtcomp.errors import RtcompError
+from rtcomp.jobs.configuration import Configuration
+from rtcomp.jobs.simulate import on_reference
+from rtcomp.stage.stage import Stage
+from rtcomp.yamlfile import YamlFile
+
+SECONDS = 20.0
+
+
+def manoeuvres(motion: Motion) -> dict[str, dict[str, Any]]:
+    """Return reference sections that stay within the recorded stroke (m), by what they are."""
+    low, high = motion.stroke
+    half, middle = 0.5 * (high - low), 0.5 * (high + low)
+    speeds = np.concatenate([np.abs(np.diff(s.position)) / motion.period for s in motion.strips])
+    fast = float(np.quantile(speeds, 0.98)) or half
+    common = {"offset": middle, "duration": SECONDS}
+    return {
+        "slow strokes over the whole stroke, both ways": {
+            "kind": "triangle", "amplitude": half, "frequency": min(0.2, fast / (4 * half)), **common,
+        },
+        "the same stretch at higher speed": {
+            "kind": "triangle", "amplitude": half, "frequency": fast / (4 * half), "corner": 0.3, **common,
+        },
+        "small fast motion up to five times the bandwidth": {
+            "kind": "multisine", "amplitude": 0.05 * half,
+            "band": {"low": 1.0, "high": 60.0, "count": 40}, **common,
+        },
+        "reversals of decreasing size": {
+            "kind": "nested-reversals", "amplitude": half, "ratio": 0.8, "count": 18, "stroke_time": 1.0,
+            "offset": middle, "start": middle,
+        },
+        "a slow drift with small loops on it": {
+            "kind": "multisine", "frequencies": [0.05, 1.3], "amplitudes": [0.8 * half, 0.1 * half], **common,
+        },
+    }  # fmt: skip
+
+
+def next_experiment(one: Stage, other: Stage, names: tuple[str, str], motion: Motion) -> Experiment | None:
+    """Return the manoeuvre in which two stages differ most in what would be measured; None if none runs.
+
+    Both are simulated in closed loop; the difference counts in position against the sensor's noise and in
+    voltage against what one count of the sensor commands.
+    """
+    if one.controller is None:
+        return None
+    noise = max(float(np.hypot(one.sensor.noise, one.sensor.resolution)), 1e-9)
+    quiet = max(one.controller.kp * noise, 1e-6)
+    best: tuple[float, str, dict[str, Any]] | None = None
+    for says, section in manoeuvres(motion).items():
+        try:
+            reference = build_reference(reference_settings(section))
+            strongest = one.voltage_limit * one.force_constant / one.mass
+            check(reference, stroke=motion.stroke, acceleration=0.5 * strongest)
+            t = np.arange(round(reference.duration * motion.rate)) / motion.rate
+            path = reference.evaluate(t)[0]
+            runs = [_run(stage, path, motion) for stage in (one, other)]
+        except RtcompError:
+            continue
+        apart = float(np.sqrt(np.mean((runs[0]["position"] - runs[1]["position"]) ** 2))) / noise
+        apart += float(np.sqrt(np.mean((runs[0]["voltage"] - runs[1]["voltage"]) ** 2))) / quiet
+        if best is None or apart > best[0]:
+            best = (apart, says, section)
+    if best is None:
+        return None
+    seconds = float(best[2].get("duration", SECONDS))
+    return Experiment(best[2], names, seconds, best[1])
+
+
+def _run(stage: Stage, path: np.ndarray, motion: Motion) -> dict[str, np.ndarray]:
+    data = {**stage.to_dict(), "rate": motion.rate}
+    config = Configuration.of(YamlFile(data, Path("stage")))
+    return on_reference(config, path, float(path[0])).columns

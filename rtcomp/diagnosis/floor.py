@@ -1,0 +1,87 @@
+"""The floor: what sensor noise, resolution and the method itself leave when nothing is missing.
+
+The explanation at hand is simulated in closed loop along the recorded reference, with the believed sensor,
+and put through the identical analysis. Where that cannot be done the sensor's noise alone is reckoned with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from rtcomp.diagnosis.base import Fitted, bounds_of
+from rtcomp.diagnosis.ledger import Ledger
+from rtcomp.diagnosis.motion import Motion, Strip
+from rtcomp.errors import RtcompError
+from rtcomp.jobs.configuration import Configuration
+from rtcomp.jobs.simulate import on_reference
+from rtcomp.stage.stage import Stage
+from rtcomp.yamlfile import YamlFile
+
+METHOD = 0.0015
+"""Relative error that the method leaves by itself: friction by a grid of reaches, forces by rows."""
+
+
+def floor_errors(stage: Stage, fitted: Fitted, motion: Motion, seed: int = 1) -> np.ndarray:
+    """Return the squared error (N^2) expected in every seen block if `stage` were the whole truth."""
+    twin = _twin(stage, motion, seed)
+    ledger, seen = fitted.ledger, fitted.ledger.seen
+    power = fitted.system.blocks.power[seen]
+    method = METHOD**2 * power
+    if twin is None:
+        return np.asarray(method + _sensor_power(stage, motion) * _rows(ledger)[seen])
+    other = Ledger(stage, twin, ledger.reaches, ledger.known)
+    system = other.system(stage_effects(stage, ledger))
+    bounds = bounds_of(stage, system.columns.shape[1], slack=0.3)
+    errors = system.blocks.left_out(seen, bounds)
+    scale = power.sum() / max(float(system.blocks.power[seen].sum()), 1e-300)
+    return np.asarray(np.maximum(errors * scale, method))
+
+
+def stage_effects(stage: Stage, ledger: Ledger) -> list:  # type: ignore[type-arg]
+    """Return the effects of `stage` that the ledger does not already know."""
+    from rtcomp.diagnosis.candidates import effect_of
+
+    known = [e.to_dict() for e in ledger.known]
+    return [effect_of(e) for e in stage.mechanics.effects if e not in known]
+
+
+def _rows(ledger: Ledger) -> np.ndarray:
+    return np.bincount(ledger.block, minlength=ledger.seen.size).astype(np.float64)
+
+
+def _sensor_power(stage: Stage, motion: Motion) -> float:
+    """Return the mean square (N^2) of the force that position noise pretends below the cut."""
+    noise = float(np.hypot(stage.sensor.noise, stage.sensor.resolution / np.sqrt(12.0)))
+    band = motion.cut / (2.5 * motion.rate)
+    inertia = stage.mass * (2 * np.pi * motion.cut) ** 2 * noise * np.sqrt(band)
+    friction = stage.friction
+    spring = (
+        (friction.stiffness() if friction is not None else 0.0)
+        * noise
+        * np.sqrt(2 * motion.cut / motion.rate)
+    )
+    return float(inertia**2 + spring**2)
+
+
+def _twin(stage: Stage, motion: Motion, seed: int) -> Motion | None:
+    """Simulate `stage` along the recorded references; None where there is no reference or controller."""
+    if stage.controller is None or any(s.reference is None for s in motion.strips):
+        return None
+    strips: list[Strip] = []
+    for strip in motion.strips:
+        assert strip.reference is not None
+        data = {**stage.to_dict(), "rate": motion.rate, "seed": seed}
+        try:
+            config = Configuration.of(YamlFile(data, Path("stage")))
+            run = on_reference(config, strip.reference, float(strip.position[0]))
+        except RtcompError:
+            return None
+        position = run.columns["position"]
+        off = float(np.sqrt(np.mean((position - strip.position) ** 2)))
+        if run.outcome.ticks < strip.time.size or not off < 0.5 * np.ptp(strip.position):
+            return None
+        strips.append(Strip(strip.time, position, run.columns["voltage"], strip.reference))
+    return replace(motion, strips=strips)
