@@ -24,7 +24,7 @@ from rtcomp.physics.coupled import LOAD_SHARE
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.physics.rows import new_rows
 from rtcomp.physics.wires import SENSED, STEP, TIME
-from rtcomp.stage.balance import forces
+from rtcomp.stage.balance import around_rows, forces
 from rtcomp.stage.stage import Stage
 
 MASS, VISCOUS, MICRO = "mass", "viscous", "micro_damping"
@@ -108,7 +108,7 @@ class Ledger:
             x, v, a = kinematics(strip, self.motion.period, effects)
             given = self._given(strip, drive, x, v, a)
             f = forces(self.stage, [*modifiers, *others], strip.time, x, v, a, strip.voltage)
-            sides.append(given + f.push - f.friction)
+            sides.append(given + around_rows(f.push - f.friction))
             moved = a * f.mass / self.stage.mass
             if gap > 0.0:
                 x = behind_play(x, gap, *self._believed)
@@ -117,7 +117,7 @@ class Ledger:
                 a = rest
             columns = [moved, v, v * np.exp(-((v / speed) ** 2))]
             columns += [self._element(strip, modifiers, r, x, v, a) for r in self.reaches]
-            tables.append(np.column_stack(columns))
+            tables.append(np.column_stack([columns[0], *map(around_rows, columns[1:])]))
         names = (MASS, VISCOUS, MICRO, *(f"reach {r:.3g}" for r in self.reaches))
         y, table = self.motion.smooth(sides), self.motion.smooth(tables)
         return System(y, table, names, Blocks.of(table, y, self.block, BLOCKS))
@@ -128,7 +128,7 @@ class Ledger:
         # What the drive remembers changes its force within a row; the mean over the row is what moved.
         parts = PARTS if any(e.initial_state().size for e in chain) else 1
         f = forces(self.stage, chain, strip.time, x, v, a, held, parts=parts)
-        return 0.5 * (f.drive + np.append(f.drive[1:], f.drive[-1:])) + f.push
+        return 0.5 * (f.drive + np.append(f.drive[1:], f.drive[-1:])) + around_rows(f.push)
 
     def _drive(self) -> list[Effect]:
         chain = [e for e in self.stage.chain if e.place is Place.DRIVE]
