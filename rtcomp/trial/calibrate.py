@@ -56,7 +56,8 @@ class Grown:
 def grow(secret: Secret, sized: Sized, rig: Rig, reference: Floats, clean: Run, target: float) -> Grown:
     """Return the effect at about `target` (rms force over that of the motion), alone in the plant.
 
-    What counts of it is what no retuning of the believed parameters takes up; of a retuning, all. Where the
+    What counts of it is what no retuning of the believed parameters takes up, or half of all where that is
+    more; of a retuning, all. Where the
     effect cannot be as strong, it stays at the most that leaves the axis controlled.
     """
     best: tuple[float, float, Grown] | None = None
@@ -70,7 +71,7 @@ def grow(secret: Secret, sized: Sized, rig: Rig, reference: Floats, clean: Run, 
             at = max(0.3 * at, sized.least)
             continue
         grown = Grown(secret.name, changes, {k: float(v) for k, v in parameters.items()}, shows)
-        got = max(shows.share if secret.retuning else shows.beyond, 1e-9)
+        got = max(shows.share if secret.retuning else max(shows.beyond, 0.5 * shows.share), 1e-9)
         off = abs(np.log(got / target))
         if best is None or off < best[0]:
             best = (float(off), at, grown)

@@ -61,12 +61,13 @@ def figures(rows: Sequence[Scored], *, gains: bool = True) -> list[Figure]:
     retuned = [r for r in rows if r.case.plan.kind == "retuned"]
     outside = [r for r in rows if r.case.plan.kind == "outside" and r.detectable]
     singles = [r.matches[0] for r in one]
-    held = [m.size for m in singles if m.held]
+    held = [m for m in singles if m.held]
     found = [
         _part("right, all cases", rows, lambda r: r.right),
         _part("named first, one effect", singles, lambda m: m.first, (0.95, 1.0)),
         _part("set holds the truth, one effect", singles, lambda m: m.held, (0.99, 1.0)),
-        _mean("mean size of that set", held, (0.0, 1.3)),
+        _mean("mean size of that set, aliases as one", [m.choices for m in held], (0.0, 1.3)),
+        _mean("mean size of that set, every name", [m.size for m in held]),
         _part("false alarm on clean", clean, lambda r: not r.quiet, (0.0, 0.01)),
         _part("false name beside one effect", one, lambda r: bool(r.wrong)),
         _part("retuned recognised", retuned, lambda r: r.right),
@@ -135,7 +136,7 @@ def _part(
     return Figure(name, value, len(items), wanted)
 
 
-def _mean(name: str, items: Sequence[float], wanted: tuple[float, float]) -> Figure:
+def _mean(name: str, items: Sequence[float], wanted: tuple[float, float] | None = None) -> Figure:
     return Figure(name, float(np.mean(items)) if items else math.nan, len(items), wanted, part=False)
 
 

@@ -17,6 +17,9 @@ ALIASES: dict[str, frozenset[str]] = {
     **dict.fromkeys(STEADY, STEADY),
     "back-emf": frozenset({"back-emf", "viscous-friction", "asymmetric-viscous-friction"}),
     "viscous-friction": frozenset({"viscous-friction", "back-emf"}),
+    "retuned-force-constant": frozenset({"drive-gain"}),
+    "retuned-mass": frozenset({"inertia"}),
+    "retuned-viscous": frozenset({"viscous-friction", "back-emf"}),
     "outside-force-bump": frozenset({"position-force", "unexplained"}),
 }
 """Names that no recording of one axis tells from the truth, the truth included."""
@@ -30,6 +33,10 @@ RETUNED: dict[str, frozenset[str]] = {
 """Parameters of the stage whose retuning says the same as the effect's name."""
 MOVED = 0.11
 """A retuning by more than a belief is ever wrong without anything hidden (a tenth)."""
+SLOTS = {"mass": "mass", "viscous": "viscous", "force_constant": "force_constant", "friction.level": "level"}
+"""Retuned parameters by their names in the plant."""
+NEAR = 0.05
+"""Part of the truth within which a retuned parameter has arrived there, however far it was off."""
 UNEXPLAINED = "unexplained"
 
 
@@ -93,6 +100,8 @@ class Match:
     """Some set of names holds it, whatever else is in that set; or its parameter was retuned."""
     size: int
     """Names in that set; 1 for a retuning, 0 where nothing holds it."""
+    choices: int
+    """The same with the truth's own aliases, which nobody can tell apart, counted as one name."""
     name: str
     """The likeliest name of that set, "" where there is none."""
 
@@ -108,21 +117,36 @@ def match(said: Said, hidden: tuple[Grown, ...]) -> tuple[list[Match], list[tupl
         if holding is not None:
             # A set that holds it among strangers is not named right, but is not another false name either.
             left.remove(holding)
-            matches.append(Match(fitting is not None, holding[0] in names, True, len(holding), holding[0]))
-        elif retunes(said, effect.name):
-            matches.append(Match(True, True, True, 1, ""))
+            matches.append(
+                Match(
+                    fitting is not None,
+                    holding[0] in names,
+                    True,
+                    len(holding),
+                    1 + len(set(holding) - names),
+                    holding[0],
+                )
+            )
+        elif retunes(said, effect):
+            matches.append(Match(True, True, True, 1, 1, ""))
         elif effect.name.startswith("outside-") and said.unexplained:
-            matches.append(Match(True, True, True, 1, UNEXPLAINED))
+            matches.append(Match(True, True, True, 1, 1, UNEXPLAINED))
         else:
-            matches.append(Match(False, False, False, 0, ""))
+            matches.append(Match(False, False, False, 0, 0, ""))
     return matches, left
 
 
-def retunes(said: Said, truth: str) -> bool:
-    """Say whether a retuning says what `truth` is."""
-    if truth.startswith("retuned-"):
+def retunes(said: Said, hidden: Grown) -> bool:
+    """Say whether a retuning says what is hidden: moved the right parameter, or moved it to the truth."""
+    if hidden.name.startswith("retuned-"):
         return said.verdict == "retuned"
-    return bool(set(said.moved) & RETUNED.get(truth, frozenset()))
+    if set(said.moved) & RETUNED.get(hidden.name, frozenset()):
+        return True
+    return any(
+        key in said.retuned and within(said.retuned[key][0], hidden.changes[slot], NEAR)
+        for key, slot in SLOTS.items()
+        if slot in hidden.changes
+    )
 
 
 def within(value: float, truth: float, part: float) -> bool:

@@ -74,7 +74,7 @@ class Scored:
         """Whether the answer is right: all found, nothing else named, and no alarm where nothing is."""
         if self.said is None or self.wrong or not all(m.found for m in self.matches):
             return False
-        return self.case.plan.kind not in ("clean", "retuned") or self.quiet
+        return self.case.plan.kind != "clean" or self.quiet
 
     @property
     def quiet(self) -> bool:
@@ -126,7 +126,7 @@ class Scored:
 def score(case: Case, outcome: Outcome, said: Said | None, fault: str, errors: Errors | None) -> Scored:
     """Hold a diagnosis against its case."""
     if said is None:
-        missed = tuple(Match(False, False, False, 0, "") for _ in case.hidden)
+        missed = tuple(Match(False, False, False, 0, 0, "") for _ in case.hidden)
         return Scored(case, outcome, None, fault, missed, (), errors)
     matches, wrong = match(said, case.hidden)
     if len(matches) == 1 and said.named and matches[0].name and matches[0].name != said.named[0][0]:

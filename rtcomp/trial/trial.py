@@ -34,7 +34,7 @@ REPLAY_S = 300.0
 
 @dataclass(frozen=True)
 class Settings:
-    """What a trial is to be. `program` is called as ``PROGRAM diagnose ...`` and ``RTCOMP replay ...``."""
+    """What a trial is to be. Recording, stage and output are added to the commands `diagnose` and `replay`."""
 
     cases: int
     seed: int
@@ -74,6 +74,9 @@ class Trial:
             ],
             "rivals": {name: [f.to_json() for f in found] for name, found in self.rivals.items()},
             "notes": self.notes,
+            "estimates": [
+                {"case": row.case.plan.name, **asdict(e)} for row in self.rows for e in row.estimates
+            ],
             "rows": [row.row() for row in self.rows],
         }
 

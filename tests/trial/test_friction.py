@@ -18,7 +18,7 @@ def path(
     """h at each of `places` (in reaches), in `parts` steps between."""
     z, at, out = fresh(), 0.0, []
     for place in places:
-        for k in range(parts):
+        for _ in range(parts):
             step = (place - at) * REACH / parts
             advance(z, step, REACH, up, down, softening)
         at = place

@@ -1,0 +1,135 @@
+"""The command `rtcomp trial` from end to end, with real processes."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from rtcomp.trial.draw import SHARES, Case, draw, plan
+from rtcomp.trial.hidden import EFFECTS
+from rtcomp.trial.seal import verify
+
+RTCOMP = (sys.executable, "-m", "rtcomp.cli.main")
+STAND_IN = Path(__file__).with_name("stand_in.py")
+
+
+def trial(
+    out: Path, *more: object, how: str = "", timeout: float = 500.0
+) -> subprocess.CompletedProcess[str]:
+    stand_in = ("--diagnose", f"{sys.executable} {STAND_IN} {how}") if how else ()
+    command = [*RTCOMP, "trial", "--out", out, "--jobs", 2, *stand_in, *more]
+    return subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=timeout)
+
+
+def checked(out: Path, cases: int) -> dict[str, object]:
+    """What every trial must leave, whatever the diagnoses were worth."""
+    answers = verify(out / "answers.json", out / "commitments.json")
+    content = json.loads((out / "trial.json").read_text())
+    rows = list(csv.DictReader((out / "rows.csv").open()))
+    assert len(answers) == len(rows) == len(content["rows"]) == cases
+    for row in rows:
+        answer = answers[row["case"]]
+        assert row["hidden"] == "+".join(e["name"] for e in answer["effects"])
+    assert Counter(r["kind"] for r in rows).keys() == set(SHARES) or cases < len(SHARES)
+    return content
+
+
+@pytest.mark.slow
+def test_a_trial_is_sealed_run_opened_and_scored(tmp_path: Path) -> None:
+    out = tmp_path / "trial"
+    run = trial(out, "--cases", 5, "--seed", 3, "--keep", "--rivals", "none", how="cogging")
+    assert run.returncode == 0, run.stderr
+    content = checked(out, 5)
+    figures = {f["name"]: f for f in content["figures"]}
+    assert figures["false alarm on clean"]["value"] == 1.0
+    assert figures["diagnosis failed"]["value"] == 0.0
+    assert figures["made worse"]["count"] == 5 and figures["made worse"]["value"] == 0.0
+    for row in content["rows"]:
+        # The stand-in hands the believed stage back; the oracle knows better, or as well where nothing is.
+        assert row["before"] == row["after"] and row["oracle"] < 1.1 * row["before"]
+    assert "5 sealed cases" in run.stdout and "NOT met" in run.stdout
+    # A change of one answer afterwards is noticed.
+    text = (out / "answers.json").read_text()
+    (out / "answers.json").write_text(text.replace('"tier": "full"', '"tier": "weak"', 1))
+    with pytest.raises(Exception, match="does not match its commitment"):
+        verify(out / "answers.json", out / "commitments.json")
+
+
+@pytest.mark.parametrize(("how", "says"), [("crash", "ends badly"), ("garbage", "not a diagnosis")])
+def test_a_diagnosis_that_fails_is_scored_as_failed(how: str, says: str, tmp_path: Path) -> None:
+    out = tmp_path / "trial"
+    run = trial(out, "--cases", 1, "--rivals", "none", "--json", how=how)
+    assert run.returncode == 0, run.stderr
+    content = json.loads(run.stdout)
+    assert says in content["rows"][0]["fault"] or "Expecting value" in content["rows"][0]["fault"]
+    assert {f["name"]: f["value"] for f in content["figures"]}["diagnosis failed"] == 1.0
+    checked(out, 1)
+    assert not (out / "cases").exists()
+
+
+def test_a_diagnosis_that_never_ends_is_ended(tmp_path: Path) -> None:
+    out = tmp_path / "trial"
+    run = trial(out, "--cases", 1, "--rivals", "none", "--timeout", 2, "--keep", how="sleep")
+    assert run.returncode == 0, run.stderr
+    assert "without an answer" in run.stdout
+    for pid in (next(out.glob("cases/*/pids"))).read_text().split():
+        stat = Path(f"/proc/{pid}/stat")
+        assert not stat.exists() or stat.read_text().rsplit(")", 1)[1].split()[0] == "Z"
+
+
+def test_same_seed_same_cases_and_a_case_comes_again_from_its_answer() -> None:
+    first, second = plan(12, 7), plan(12, 7)
+    assert first == second != plan(12, 8)
+    case = draw(first[0])
+    again = Case.again(json.loads(json.dumps(case.answer())))
+    assert again == draw(first[0]) == case
+    run, same = case.run("unseen"), again.run("unseen")
+    assert (run.position == same.position).all() and (run.voltage == same.voltage).all()
+    train = case.run("train")
+    assert train.reference.size != run.reference.size or (train.reference != run.reference).any()
+
+
+def test_a_large_trial_hides_every_effect_in_the_parts_promised() -> None:
+    plans = plan(300, 1)
+    kinds = Counter(p.kind for p in plans)
+    assert all(abs(kinds[kind] / 300 - share) < 0.01 for kind, share in SHARES.items())
+    assert {s for p in plans if p.kind == "one" for s in p.secrets} == {e.name for e in EFFECTS}
+    assert 0.1 < sum(p.tier == "weak" for p in plans) / 300 < 0.35
+    assert len({p.name for p in plans}) == 300
+
+
+@pytest.mark.slow
+def test_prove(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A small trial of the program itself: its seal holds, all processes end, its scores are shown."""
+    out = tmp_path / "trial"
+    run = trial(out, "--cases", 8, "--seed", 11, timeout=3000.0)
+    with capsys.disabled():
+        print(f"\n{run.stdout}{run.stderr}")
+    assert run.returncode == 0
+    content = checked(out, 8)
+    figures = {f["name"]: f for f in content["figures"]}
+    assert figures["right, all cases"]["count"] == 8
+    assert figures["diagnosis failed"]["value"] == 0.0
+    assert figures["made worse"]["count"] == 8
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rival", ["frols", "sindy"])
+def test_rivals_name_a_strong_plain_effect(rival: str, tmp_path: Path) -> None:
+    pytest.importorskip({"frols": "sysidentpy", "sindy": "pysindy"}[rival])
+    from rtcomp.trial.draw import Plan
+    from rtcomp.trial.rival import name
+    from rtcomp.trial.stagefile import write_recording
+    from rtcomp.yamlfile import dump_yaml
+
+    case = draw(Plan("case", "one", ("drive-offset",), "full", 4))
+    dump_yaml(tmp_path / "stage.yaml", case.believed)
+    write_recording(tmp_path / "train.csv.gz", case.run("train"), case.loop.resolution)
+    names = [e["names"][0] for e in name(rival, tmp_path)["effects"]]  # type: ignore[attr-defined]
+    assert "constant-force" in names
