@@ -34,7 +34,7 @@ REPLAY_S = 300.0
 
 @dataclass(frozen=True)
 class Settings:
-    """What a trial is to be. Recording, stage and output are added to the commands `diagnose` and `replay`."""
+    """What a trial is to be; recording, stage and output are added to `diagnose` and `replay`."""
 
     cases: int
     seed: int
