@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rtcomp.diagnosis.base import Fitted, fit_base
-from rtcomp.diagnosis.candidates import Entry, Scene, effect_of
+from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Refined, refine
+from rtcomp.diagnosis.scene import Entry, Scene
 from rtcomp.diagnosis.screen import Screened, screen
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats

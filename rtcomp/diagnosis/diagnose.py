@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rtcomp.diagnosis.base import Fitted, fit_base
-from rtcomp.diagnosis.candidates import Entry
 from rtcomp.diagnosis.decide import ABOVE_FLOOR, Choice, Decision, decide
 from rtcomp.diagnosis.experiment import next_experiment
 from rtcomp.diagnosis.extend import extended_stage, level_and_reach
@@ -16,6 +15,7 @@ from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.motion import UNSEEN, Motion, prepare
 from rtcomp.diagnosis.refine import intervals
 from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
+from rtcomp.diagnosis.scene import Entry
 from rtcomp.errors import RtcompError
 from rtcomp.kernels import Floats
 from rtcomp.physics import catalogue, entries

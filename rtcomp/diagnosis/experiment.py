@@ -1,4 +1,4 @@
-"""The next experiment: of the manoeuvres within stroke and force, the one that best tells two stages apart."""
+"""The next experiment: among manoeuvres within stroke and force, the one that tells two stages apart."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rtcomp.diagnosis.base import FIXED, Fitted
-from rtcomp.diagnosis.candidates import Entry
+from rtcomp.diagnosis.scene import Entry
 from rtcomp.stage.stage import Stage
 
 REPLACED = {"inertia": "mass"}
@@ -41,8 +41,11 @@ def extended_stage(believed: Stage, fitted: Fitted, entries: Sequence[Entry]) ->
     return Stage.from_dict(data)
 
 
-def level_and_reach(elements: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Return friction.level (N, sum of yield forces) and friction.reach (m, travel to half of it)."""
+def level_and_reach(elements: Sequence[Sequence[float]]) -> tuple[float, float]:
+    """Return friction.level (N, sum of yield forces) and friction.reach (m, travel to half of it).
+
+    An element is its stiffness (N/m) and its reach (m).
+    """
     k, r = np.array([e[0] for e in elements]), np.array([e[1] for e in elements])
     level = float(np.sum(k * r))
     travel = np.concatenate([[0.0], np.sort(r)])

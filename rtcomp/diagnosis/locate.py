@@ -71,7 +71,8 @@ def _since_reversal(moving: Floats, position: Floats, period: float) -> tuple[Fl
             last, at = moving[k], k
         starts[k] = at
     rows = np.arange(moving.size)
-    return (rows - starts) * period, np.abs(position - position[starts])
+    way: Floats = np.abs(position - position[starts])
+    return np.asarray((rows - starts) * period, dtype=np.float64), way
 
 
 def locate(motion: Motion, before: Floats, after: Floats | None, seed: int = 0) -> list[Place]:
@@ -158,7 +159,7 @@ def _line(motion: Motion, before: Floats, after: Floats | None) -> Place | None:
     size = before.size
     window = np.hanning(size)
     power = np.abs(np.fft.rfft(before * window)) ** 2
-    frequency = np.fft.rfftfreq(size, 1 / rate)
+    frequency = np.asarray(np.fft.rfftfreq(size, 1 / rate), dtype=np.float64)
     usable = (frequency > max(10 * rate / size, 1.0)) & (frequency < motion.cut)
     if not usable.any():
         return None
@@ -171,9 +172,12 @@ def _line(motion: Motion, before: Floats, after: Floats | None) -> Place | None:
     f = float(frequency[at])
     around_it = slice(max(at - 40, 0), at + 41)
     scale = 2.0 / window.sum()
-    later = None if after is None else scale * np.abs(np.fft.rfft(after * window))[around_it]
+
+    def part(residual: Floats) -> Floats:
+        return np.asarray(scale * np.abs(np.fft.rfft(residual * window))[around_it], dtype=np.float64)
+
     return Place(
         "frequency", "Hz", (f * 0.99, f * 1.01), share, 0.005,
         f"{100 * share:.0f} % of the mismatch is a tone at {f:.4g} Hz, whatever the motion",
-        frequency[around_it], scale * np.abs(np.fft.rfft(before * window))[around_it], later,
+        frequency[around_it], part(before), None if after is None else part(after),
     )  # fmt: skip

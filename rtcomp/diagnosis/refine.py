@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtcomp.diagnosis.base import Fitted, bounds_of
-from rtcomp.diagnosis.candidates import Entry, effect_of
+from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.ledger import Ledger, System
 from rtcomp.diagnosis.motion import Motion
+from rtcomp.diagnosis.scene import Entry
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Parameter, catalogue

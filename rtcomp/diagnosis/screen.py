@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtcomp.diagnosis.candidates import Column, Entry, Point, Scene, effect_of, searches
+from rtcomp.diagnosis.candidates import effect_of, searches
+from rtcomp.diagnosis.scene import Column, Entry, Point, Scene
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 

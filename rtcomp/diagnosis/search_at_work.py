@@ -1,0 +1,139 @@
+"""Entries tried at work, at a few sizes: what changes drive, friction, motion or sensor.
+
+Sizes come from the recording at hand: its commands, speeds, times, its noise, and the friction already found.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from rtcomp.diagnosis.scene import Entry, Point, Scene
+
+
+def at_work(scene: Scene) -> Iterator[Point]:
+    """Go through every entry worth trying at work on this recording."""
+    for make in (_drive, _speed_dependent, _presliding, _inertial, _sensing):
+        yield from make(scene)
+
+
+def _drive(s: Scene) -> list[Point]:
+    largest, typical = float(np.abs(s.volts).max()), float(np.sqrt(np.mean(s.volts**2)))
+    period = s.motion.period
+    points = [{"name": "drive-deadband", "width": w * typical} for w in (0.03, 0.1, 0.25, 0.5)]
+    points += [{"name": "drive-saturation", "limit": w * largest} for w in (0.45, 0.6, 0.75, 0.88)]
+    points += [{"name": "drive-gain", "gain": g} for g in (0.7, 0.85, 1.15, 1.4)]
+    for n in (0.5, 1.0, 2.0, 4.0, 8.0):
+        points += [
+            {"name": "drive-delay", "delay": n * period},
+            {"name": "drive-lag", "time_constant": n * period},
+        ]
+        points += [{"name": "sensor-delay", "delay": n * period}]
+    return [Point(p) for p in points]
+
+
+def _speed_dependent(s: Scene) -> list[Point]:
+    points: list[Entry] = [
+        {"name": "stribeck", "rise": rise, "velocity": float(v)} for v in s.speeds(5) for rise in (0.15, 0.5)
+    ]
+    points += [{"name": "frictional-lag", "time_constant": t} for t in (2e-3, 1e-2, 5e-2)]
+    return [Point(p) for p in points]
+
+
+def _presliding(s: Scene) -> list[Point]:
+    reach = float(s.fitted.ledger.reaches.max())
+    points: list[Entry] = [{"name": "asymmetric-friction", "asymmetry": a} for a in (-0.2, -0.05, 0.05, 0.2)]
+    points += [{"name": "non-congruent-friction", "softening": a} for a in (0.05, 0.2, 0.5)]
+    points += [{"name": "load-dependent-friction", "coefficient": a} for a in (0.03, 0.15)]
+    points += [
+        {"name": "stiction-ageing", "growth": g, "distance": d * reach}
+        for g in (0.05, 0.2)
+        for d in (0.1, 1.0)
+    ]
+    points += [
+        {"name": "creep", "fraction": f, "time_constant": t} for f in (0.05, 0.2) for t in (0.03, 0.3, 3.0)
+    ]
+    points += [{"name": "backlash", "gap": g * reach} for g in (0.03, 0.1, 0.25, 0.6, 1.5)]
+    return [Point(p) for p in points]
+
+
+def _inertial(s: Scene) -> list[Point]:
+    mass = s.fitted.ledger.stage.mass
+    points: list[Entry] = [{"name": "inertia", "mass": mass * f} for f in (0.5, 0.75, 1.3, 1.8)]
+    for f in np.geomspace(4.0, 1.5 * s.motion.cut, 9):
+        points += [
+            {"name": "resonance", "frequency": float(f), "damping": z, "mass_ratio": r}
+            for z in (0.03, 0.15)
+            for r in (0.1, 0.5)
+        ]
+    return [Point(p) for p in points]
+
+
+def _sensing(s: Scene) -> list[Point]:
+    points: list[Entry] = []
+    noise = max(
+        float(np.hypot(s.fitted.ledger.stage.sensor.noise, s.fitted.ledger.stage.sensor.resolution)), 1e-9
+    )
+    for period in _cyclic_periods(s):
+        points += [
+            {"name": "sensor-periodic-error", "amplitude": a * noise, "period": period, "phase": p}
+            for a in (5.0, 20.0)
+            for p in (0.0, math.pi / 2, math.pi, -math.pi / 2)
+        ]
+    reach = float(s.fitted.ledger.reaches[0])
+    total = float(s.time.max())
+    points += [
+        {"name": "sensor-drift", "drift": d * reach, "time_constant": t * total}
+        for d in (-5.0, -0.5, 0.5, 5.0)
+        for t in (0.1, 0.5)
+    ]
+    if _changes_once(s):
+        points += [
+            {"name": "sensor-jump", "size": d * reach, "time": t}
+            for t in _steps(s)
+            for d in (-2.0, -0.3, 0.3, 2.0)
+        ]
+    return [Point(p) for p in points]
+
+
+def _cyclic_periods(s: Scene, peaks: int = 2) -> list[float]:
+    """Return periods (m) whose apparent acceleration stands out of the residual."""
+    mass = s.fitted.ledger.stage.mass
+    step = float(np.quantile(np.abs(np.diff(s.x)), 0.5)) or s.span / 1000
+    n = np.arange(3.0, min(400.0, s.span / (3 * step)), 0.2)
+    if n.size == 0:
+        return []
+    power = np.zeros(n.size)
+    weight = mass * s.v**2
+    for i in range(0, n.size, 64):
+        angle = 2 * np.pi * np.outer(n[i : i + 64], s.x / s.span)
+        for wave in (np.sin(angle), np.cos(angle)):
+            wave *= weight
+            power[i : i + 64] += (wave @ s.residual) ** 2 / np.maximum(np.sum(wave**2, axis=1), 1e-300)
+    found = []
+    for _ in range(peaks):
+        at = int(np.argmax(power))
+        found.append(s.span / float(n[at]))
+        power[max(at - 3, 0) : at + 4] = 0.0
+    return found
+
+
+def _changes_once(s: Scene) -> bool:
+    """Tell whether the residual is unlike before and after some time."""
+    total = np.cumsum(s.residual - s.residual.mean())
+    return bool(np.ptp(total) > 0)
+
+
+def _steps(s: Scene, count: int = 3) -> list[float]:
+    """Return times (s) at which the residual most suddenly changes its level."""
+    width = max(4, s.residual.size // 60)
+    mean = np.convolve(s.residual, np.ones(width) / width, mode="valid")
+    change = np.abs(mean[width:] - mean[:-width])
+    found = []
+    for _ in range(count):
+        at = int(np.argmax(change))
+        found.append(float(s.time[at + width]))
+        change[max(at - width, 0) : at + width] = 0.0
+    return found
