@@ -253,16 +253,19 @@ def _run(
     tick = 1.0 / loop.rate
     step = tick / parts
     z = np.zeros(AT + 2 * DEPTH)
-    commands = np.zeros(reference.size)
-    past = np.zeros(int(p.sensor_delay / step) + 1)
-    late = round(p.delay / step)
+    commands = np.zeros(reference.size + 1)
+    ago = p.sensor_delay / step
+    past = np.zeros(int(ago) + 2)
+    late = p.delay / step
     two = p.second_mass > 0.0
     mass = p.mass - p.second_mass
     x = v = x2 = v2 = h = crept = lagged_speed = lagged_volts = play = rest = integral = before = 0.0
     n = 0
     for k in range(reference.size):
         t = k * tick
-        out[2, k] = _reading(p, t, past[(n + 1) % past.size])
+        older = ago - int(ago)
+        seen = (1.0 - older) * past[(n + 2) % past.size] + older * past[(n + 1) % past.size]
+        out[2, k] = _reading(p, t, seen)
         measured = out[2, k] + noise[k]
         if loop.resolution > 0.0:
             measured = math.floor(measured / loop.resolution + 0.5) * loop.resolution
@@ -277,7 +280,11 @@ def _run(
         for j in range(parts):
             t = (k * parts + j) * step
             arrived = k * parts + j - late
-            u = _volts(p, commands[arrived // parts] if arrived >= 0 else 0.0)
+            first = math.floor(arrived)
+            part = arrived - first  # a command may arrive within a sub-step
+            u = part * commands[(first + 1) // parts] if first >= -1 else 0.0
+            u += (1.0 - part) * commands[first // parts] if first >= 0 else 0.0
+            u = _volts(p, u)
             if p.lag > 0.0:
                 lagged_volts += (u - lagged_volts) * (1.0 - math.exp(-step / p.lag))
                 u = lagged_volts

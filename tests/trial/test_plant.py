@@ -56,6 +56,21 @@ def test_the_axis_follows_and_the_noise_is_as_told(moved: tuple[Rig, Run]) -> No
     assert rig.stroke == pytest.approx(7e-4, rel=0.5)
 
 
+@pytest.mark.parametrize("delay", [1.0e-3, 1.53e-3])
+def test_a_late_reading_is_late_by_just_that_much(delay: float) -> None:
+    """Under a controller too weak to matter: the same motion, only later."""
+    loop = LOOP._replace(kp=1.0, ki=0.0, kd=0.0, noise=0.0, resolution=0.0)
+    free = PHYSICS._replace(level=1e-9, viscous=40.0, micro_damping=0.0)
+    reference = np.where(np.arange(3000) < 2, 1e-3, 0.0)  # one kick, then coasting under a weak controller
+    late = simulate(free._replace(delay=delay), loop, reference, 1)
+    prompt = simulate(free, loop, reference, 1)
+    there = np.interp(late.time - delay, prompt.time, prompt.truth)
+    assert np.max(np.abs(late.truth - there)[10:200]) < 2e-3 * np.max(np.abs(prompt.truth))
+    blind = simulate(free._replace(sensor_delay=delay), loop, reference, 1)
+    there = np.interp(blind.time - delay, prompt.time, prompt.truth)
+    assert np.max(np.abs(blind.truth - there)[10:200]) < 2e-3 * np.max(np.abs(prompt.truth))
+
+
 @pytest.mark.parametrize("name", sorted(SECRETS))
 def test_everything_that_can_be_hidden_changes_the_balance_and_grows_with_its_strength(
     name: str, moved: tuple[Rig, Run]
