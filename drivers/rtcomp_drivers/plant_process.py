@@ -18,7 +18,7 @@ from rtcomp.errors import DeviceError, DeviceTimeoutError
 
 
 class PlantProcess:
-    """A running plant server; a context manager that ends it.
+    """A running plant server; a context manager that ends it. It also ends by itself when this process dies.
 
     Starting takes up to a minute the first time, when the simulation is compiled. Raises DeviceError where
     the server ends instead of serving, with what it said, and DeviceTimeoutError where it says nothing.
@@ -31,13 +31,17 @@ class PlantProcess:
         self._log = Path(self._folder.name, "summary.json")
         self._errors = Path(self._folder.name, "errors.txt")
         command = [sys.executable, "-m", "rtcomp_drivers.plant_server", "--config", str(config), "--serial"]
-        command += ["--json", "--seed", str(seed), "--log", str(self._log)]
+        command += ["--until-eof", "--json", "--seed", str(seed), "--log", str(self._log)]
         if not realtime:
             command.append("--no-realtime")
         with self._errors.open("wb") as errors:
             # A session of its own: Ctrl-C at the terminal is for the loop, which ends the plant afterwards.
             self.process = subprocess.Popen(
-                command, stdout=subprocess.PIPE, stderr=errors, start_new_session=True
+                command,
+                stdin=subprocess.PIPE,  # never written to: it closes when this process dies, however it dies
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                start_new_session=True,
             )
         self.summary: dict[str, Any] | None = None
         """What the server saw; after `stop`."""
@@ -75,8 +79,9 @@ class PlantProcess:
         if self.process.poll() is None:
             self.process.kill()
             self.process.wait()
-        if self.process.stdout is not None:
-            self.process.stdout.close()
+        for pipe in (self.process.stdin, self.process.stdout):
+            if pipe is not None:
+                pipe.close()
         self._folder.cleanup()
 
     def __enter__(self) -> Self:

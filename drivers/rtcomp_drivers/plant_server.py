@@ -94,18 +94,25 @@ class PlantServer:
         """End `run` within a millisecond; may be called from a signal handler."""
         self._stopped = True
 
-    def run(self) -> None:
-        """Serve until `stop`; then zero the output and let go of the port."""
+    def run(self, lifeline: int | None = None) -> None:
+        """Serve until `stop`; then zero the output and let go of the port.
+
+        `lifeline` is the descriptor of a pipe at whose end-of-file the server ends too: that comes when the
+        process that holds its other end has ended, however it did.
+        """
         board, keeping, master = self.board, self.keeping, self._master
+        watched = [master] if lifeline is None else [master, lifeline]
         clock, wait, read = time.monotonic, select.select, os.read
         self.started = clock() - board.time
         keeping._begin = clock()
         try:
             while not self._stopped:
-                ready = wait([master], [], [], _SLICE_S)[0]
+                ready = wait(watched, [], [], _SLICE_S)[0]
                 arrived = clock()
+                if lifeline in ready and not read(lifeline, _MOST):
+                    break
                 self._catch_up(arrived)
-                data = read(master, _MOST) if ready else b""
+                data = read(master, _MOST) if master in ready else b""
                 now = max(arrived - self.started, board.time)
                 answer = board.receive(data, now) if data else board.run_until(now)
                 if answer:
@@ -184,13 +191,15 @@ def serve(
     as_json: bool = False,
     log: Path | None = None,
     realtime: bool = True,
+    until_eof: bool = False,
 ) -> dict[str, Any]:
     """Run `stage` behind a port until SIGINT or SIGTERM; return the summary that is also written.
 
     Prints one line with the port on stdout (`as_json`: an object), at exit a JSON summary on stderr, or to
     the file `log`. With `realtime` the process runs under SCHED_FIFO where that is allowed; what is in
-    force stands in the line and in the summary. Raises ConfigError for a link that it does not speak and
-    DeviceError where the port cannot be had. Call it from the main thread: it sets signal handlers.
+    force stands in the line and in the summary. With `until_eof` it ends at the end of standard input too.
+    Raises ConfigError for a link that it does not speak and DeviceError where the port cannot be had. Call
+    it from the main thread: it sets signal handlers.
     """
     if link != "serial":
         raise ConfigError(f"plant server: unknown link {link!r}; it serves 'serial'")
@@ -211,7 +220,7 @@ def serve(
         else:
             line = f"port: {server.port}"
         print(line, flush=True)
-        server.run()
+        server.run(sys.stdin.fileno() if until_eof else None)
     finally:
         gc.enable()
         gc.unfreeze()
@@ -266,6 +275,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--log", type=Path, help="write the summary to this file instead of stderr")
     parser.add_argument("--seed", type=int, default=0, help="of the sensor's noise")
     parser.add_argument("--no-realtime", action="store_true", help="do not ask for SCHED_FIFO")
+    parser.add_argument(
+        "--until-eof", action="store_true", help="end at the end of standard input too: with who started it"
+    )
     options = parser.parse_args(arguments)
     try:
         serve(
@@ -274,6 +286,7 @@ def main(arguments: list[str] | None = None) -> int:
             as_json=options.json,
             log=options.log,
             realtime=not options.no_realtime,
+            until_eof=options.until_eof,
         )
     except RtcompError as error:
         print(f"error: {error}", file=sys.stderr)

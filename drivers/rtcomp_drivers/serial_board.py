@@ -46,7 +46,12 @@ class SerialSettings(DriverSettings):
     reply_timeout: float | None = Field(
         None, gt=0.0, le=1.0, description="s to wait for a sample; without it 0.7 of the period"
     )
-    max_missed: int = Field(20, ge=0, le=100_000, description="samples that may be missing in a row")
+    max_missed: int | None = Field(
+        None,
+        ge=0,
+        le=100_000,
+        description="samples that may be missing in a row; without it as many as the watchdog's time holds",
+    )
     connect_timeout: float = Field(3.0, gt=0.0, le=60.0, description="s to wait for a board to answer")
     clear_fault: bool = Field(False, description="clear, when opening, a fault that the board has latched")
 
@@ -72,6 +77,11 @@ class SerialDriver(Driver):
             raise ConfigError(f"device: watchdog is {settings.watchdog:g} s; it must be at least {least}")
         timeout = settings.reply_timeout
         self._timeout = 0.7 * bench.period if timeout is None else timeout
+        most = settings.max_missed
+        if most is None:  # the host gives up when the board would: nothing heard for the watchdog's time
+            most = math.ceil(settings.watchdog / max(bench.period, self._timeout) - 1e-9)
+        self.max_missed = most
+        """Samples that may be missing in a row."""
         self._link: SerialLink | None = None
         self._reset()
 
@@ -229,7 +239,7 @@ class SerialDriver(Driver):
     def _miss(self, link: SerialLink) -> None:
         self.counters["missed"] += 1
         self._missed += 1
-        if self._missed > self.settings.max_missed:
+        if self._missed > self.max_missed:
             raise DeviceTimeoutError(
                 f"{link.who}: no sample in {self._missed} exchanges in a row (waited "
                 f"{1e3 * self._timeout:.3g} ms in each); is it still powered and connected?"

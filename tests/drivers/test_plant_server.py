@@ -113,6 +113,51 @@ def test_a_signal_ends_it_in_order(stage_file, tmp_path, number):
     device.close()  # whose board has gone
 
 
+PARENT = """
+import sys, time
+from rtcomp_drivers.plant_process import PlantProcess
+with PlantProcess(sys.argv[1]) as plant:
+    print(plant.process.pid, plant.port, flush=True)
+    time.sleep(600.0)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_it_does_not_outlive_the_process_that_started_it(stage_file, number):
+    with subprocess.Popen(
+        [sys.executable, "-c", PARENT, str(stage_file)], stdout=subprocess.PIPE, text=True
+    ) as parent:
+        pid, port = parent.stdout.readline().split()
+        device = create({"driver": "serial", "port": port, "watchdog": 2.0}, Bench(period=1e-3))
+        device.open()
+        device.exchange(1.0)
+        ends = os.pidfd_open(int(pid))
+        try:
+            assert not select.select([ends], [], [], 0.0)[0]
+            parent.send_signal(number)
+            assert select.select([ends], [], [], 20.0)[0], "the server outlives its parent"
+        finally:
+            os.close(ends)
+    with pytest.raises(DeviceError):
+        for _ in range(20):
+            device.exchange(1.0)
+    device.close()
+
+
+def test_without_a_pipe_to_hold_on_to_it_stays(stage_file):
+    """Its standard input at its end from the start: started from a service or with </dev/null."""
+    command = [sys.executable, "-m", "rtcomp_drivers.plant_server", "--config", str(stage_file), "--serial"]
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as server:
+        assert server.stdout.readline().startswith("port: /dev/")
+        with pytest.raises(subprocess.TimeoutExpired):
+            server.wait(0.5)
+        server.terminate()
+        assert server.communicate(timeout=20)[0] == ""
+        assert server.returncode == 0
+
+
 def test_it_moves_in_real_time_with_and_without_a_host(plant):
     with connect(plant) as device:
         first = device.exchange(0.0)

@@ -230,6 +230,37 @@ def test_a_missing_sample_is_the_last_one_again_and_too_many_are_an_error(pty_bo
     assert device.counters["missed"] == 4
 
 
+@pytest.mark.parametrize(
+    ("period", "settings", "most"),
+    [
+        (1e-3, {}, 100),
+        (1e-4, {}, 1000),
+        (0.02, {}, 5),
+        (0.05, {}, 2),
+        (1e-3, {"watchdog": 1.0}, 1000),
+        (1e-3, {"watchdog": 1.0, "reply_timeout": 0.05}, 20),
+        (1e-3, {"max_missed": 7}, 7),
+        (1e-3, {"max_missed": 0}, 0),
+    ],
+)
+def test_samples_may_be_missing_for_the_watchdogs_time(period, settings, most):
+    device = create({"driver": "serial", "port": "/dev/null", **settings}, Bench(period=period))
+    assert device.max_missed == most
+
+
+def test_after_the_watchdogs_time_without_a_sample_it_ends(pty_board):
+    board = pty_board()
+    with serial(board.port, reply_timeout=0.05, watchdog=0.4) as device:
+        device.exchange(0.0)
+        board.to_host = lambda _: b""
+        silent = time.monotonic()
+        with pytest.raises(DeviceTimeoutError, match="9 exchanges in a row"):
+            for _ in range(100):
+                device.exchange(0.0)
+        assert time.monotonic() - silent >= 0.4
+        board.to_host = lambda data: data
+
+
 def test_after_a_pause_of_the_line_samples_are_fresh_again(pty_board):
     board = pty_board()
     with serial(board.port, reply_timeout=0.05, watchdog=1.0) as device:
