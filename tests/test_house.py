@@ -76,3 +76,9 @@ def test_every_decision_is_indexed_and_has_its_three_parts(path: Path) -> None:
     headings = [line for line in text.splitlines() if line.startswith("## ")]
     assert headings == ["## Context", "## Decision", "## Consequences"]
     assert text.splitlines()[2] == path.name[:10]
+
+
+def test_no_two_test_files_have_one_name() -> None:
+    """The folders of tests are no packages: pytest imports every file of theirs by its bare name."""
+    names = [path.name for path in (TOP / "tests").rglob("*.py") if path.name != "conftest.py"]
+    assert sorted(names) == sorted(set(names))
