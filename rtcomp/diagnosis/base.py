@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rtcomp import physics
 from rtcomp.diagnosis.blocks import Bounds
 from rtcomp.diagnosis.ledger import Ledger, System, grid_of
 from rtcomp.diagnosis.motion import Motion
@@ -76,8 +77,9 @@ def fit_base(
 ) -> Fitted:
     """Refit the believed stage, with `effects` at work, on the grid of reaches that predicts best."""
     best: Fitted | None = None
+    known = [e for e in map(physics.build, stage.mechanics.effects) if e.place is not physics.Place.DRIVE]
     for scale in scales:
-        ledger = Ledger(stage, motion, grid_of(stage, scale))
+        ledger = Ledger(stage, motion, grid_of(stage, scale), known)
         system = ledger.system(effects or [])
         bounds = bounds_of(stage, system.columns.shape[1], released=released)
         errors = system.blocks.left_out(ledger.seen, bounds)

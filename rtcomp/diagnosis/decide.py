@@ -28,6 +28,8 @@ SHORTLIST = 7
 QUICK, CONTENDERS = 2, 3
 """Steps of refinement for the whole short list, and how many of it are refined to the end."""
 LEAST_SHARE = 0.04
+ENOUGH, ENOUGH_SHAPELESS = 0.8, 0.6
+"""Part of the excess over the floor that names must explain together, else none is given."""
 REST = 0.5
 """Part of what is left that a second or third entry must explain."""
 """Part of the present squared error that an entry must explain to be worth naming."""
@@ -64,6 +66,16 @@ class Decision:
     base: Fitted
     first_look: list[Screened] = field(default_factory=list)
     first_refined: dict[str, float] = field(default_factory=dict)
+
+    def abstain_if_poor(self, floor: Floats) -> None:
+        """Take the names back where together they leave too much: the nearest name would be the wrong one."""
+        before, after = float(self.base.errors.sum()), float(self.refined.errors.sum())
+        excess = max(before - float(floor.sum()), 1e-300)
+        explained = (before - after) / excess
+        shapeless = all(c.names[0] in SHAPELESS for c in self.choices)
+        enough = ENOUGH_SHAPELESS if shapeless else ENOUGH
+        if explained < enough and after > 4.0 * ABOVE_FLOOR * float(floor.sum()):
+            self.choices = []
 
 
 Progress = Callable[[float, str], None]

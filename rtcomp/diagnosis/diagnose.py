@@ -28,6 +28,8 @@ NEGLIGIBLE = 0.006
 """Relative force error up to which a recording is held to agree, whatever its noise promises."""
 MOVED = 0.02
 """Relative change of a parameter that is worth reporting."""
+MODEL = 0.005
+"""Relative half width of an interval that no amount of data removes: kernels and friction grid are models."""
 UNSEEABLE = ("sensor-scale",)
 """Entries that no recording of position and voltage shows: they scale everything."""
 
@@ -53,8 +55,12 @@ def diagnose(
     least = np.maximum(floor, NEGLIGIBLE**2 / ABOVE_FLOOR * base.system.blocks.power[base.ledger.seen])
     decision = decide(stage, motion, base, least, say)
     final = decision.refined.fitted
-    named = [dict(e) for e in decision.refined.entries]
-    extended = extended_stage(stage, final, named)
+    decision.abstain_if_poor(least)
+    entries_found = [dict(e) for e in decision.refined.entries] if decision.choices else []
+    if not decision.choices:
+        final = base
+    named, own, decision.choices = _fold(stage, final, entries_found, decision.choices)
+    extended = own if named or entries_found else retuned_stage
     say(0.2, "judge")
     fit = Fit(
         _held_out(stage, motion),
@@ -62,18 +68,20 @@ def diagnose(
         _held_out(extended, motion),
         float(np.sqrt(floor.sum() / power)),
     )
-    if named and fit.after > 1.02 * fit.before:
+    if named and fit.after > 1.02 * min(fit.before, fit.retuned):
         # What the ledger gains must hold in the stage itself; else it is not offered as an explanation.
         named, decision.choices, extended, final = [], [], retuned_stage, base
         fit = Fit(fit.before, fit.retuned, fit.retuned, fit.floor)
+    if not named and fit.before <= fit.after:
+        extended = stage
+        fit = Fit(fit.before, fit.retuned, fit.before, fit.floor)
     say(0.4, "locate")
     where = locate(motion, base.residual, final.residual if named else None, seed)
     effects = _effects(decision, named, base, final, least)
-    retuned = _retuned(stage, final)
-    verdict = _verdict(effects, base, floor, least, fit)
+    retuned = _retuned(stage, final, extended)
+    verdict = _verdict(effects, final, floor, least, fit)
     if verdict == "consistent":
         where = []
-        extended = retuned_stage
     elif verdict == "unexplained" and not effects:
         effects = [Named(("unexplained",), 1.0, {}, 1.0)]
     say(0.8, "locate")
@@ -125,12 +133,14 @@ def _effects(
     excess = max(float(base.errors.sum() - floor.sum()), 1e-300)
     spans = intervals(decision.refined)
     found = []
-    for i, (entry, choice) in enumerate(zip(named, decision.choices, strict=True)):
+    names = [str(e["name"]) for e in decision.refined.entries]
+    for entry, choice in zip(named, decision.choices, strict=True):
+        at = names.index(str(entry["name"]))
         values = {}
         for parameter in catalogue.entry(str(entry["name"])).parameters:
             value = entry.get(parameter.name)
             if isinstance(value, int | float):
-                low, high = spans.get((i, parameter.name), (float(value), float(value)))
+                low, high = spans.get((at, parameter.name), (float(value), float(value)))
                 values[parameter.name] = Value(float(value), low, high, parameter.unit)
         share = float(np.clip(choice.gain / excess, 0.0, 1.0))
         found.append(Named(tuple(choice.names), choice.probability, values, share, _experiment_of(choice)))
@@ -147,18 +157,42 @@ def _experiment_of(choice: Choice) -> str:
     return "; ".join(f"{n}: {catalogue.entry(n).experiment}" for n in choice.names)
 
 
-def _verdict(effects: list[Named], base: Fitted, floor: Floats, least: Floats, fit: Fit) -> Verdict:
+def _verdict(effects: list[Named], final: Fitted, floor: Floats, least: Floats, fit: Fit) -> Verdict:
     if effects:
         return "missing-physics"
-    left = float(base.errors.sum())
-    if left > ABOVE_FLOOR * float(least.sum()):
+    left = float(final.errors.sum())
+    if left > 1.5 * ABOVE_FLOOR * float(least.sum()):
         return "unexplained"
-    if fit.before > 1.25 * fit.retuned and fit.before > NEGLIGIBLE:
+    if fit.before > 1.25 * fit.after and fit.before > NEGLIGIBLE:
         return "retuned"
     return "consistent" if left < 100 * float(floor.sum()) else "unexplained"
 
 
-def _retuned(believed: Stage, final: Fitted) -> list[Retuned]:
+FOLDED = ("viscous-friction", "inertia")
+"""Entries that are numbers of the believed stage with other values: reported as retuned."""
+
+
+def _fold(
+    stage: Stage, final: Fitted, found: list[Entry], choices: list[Choice]
+) -> tuple[list[Entry], Stage, list[Choice]]:
+    """Put entries that only change a believed number into that number; return the others, and the stage."""
+    named, kept, changes = [], [], {}
+    plain = extended_stage(stage, final, [])
+    for entry, choice in zip(found, choices, strict=True):
+        name = str(entry["name"])
+        if name == "viscous-friction" and stage.mechanics.viscous > 0:
+            value = plain.mechanics.viscous + float(entry["coefficient"])  # type: ignore[arg-type]
+            changes["viscous"] = max(value, 0.0)
+        elif name == "inertia":
+            changes["mass"] = float(entry["mass"])  # type: ignore[arg-type]
+        else:
+            named.append(entry)
+            kept.append(choice)
+    own = extended_stage(stage, final, named)
+    return named, own.with_changes(stage=changes) if changes else own, kept
+
+
+def _retuned(believed: Stage, final: Fitted, extended: Stage) -> list[Retuned]:
     """Return the believed parameters that the fit moved, with jackknife intervals over blocks."""
     seen = final.ledger.seen
     members = np.flatnonzero(seen)
@@ -176,7 +210,8 @@ def _retuned(believed: Stage, final: Fitted) -> list[Retuned]:
     table = np.array(rows)
     count = members.size
     spread = np.sqrt((count - 1) / count * np.sum((table[1:] - table[1:].mean(axis=0)) ** 2, axis=0))
-    m = believed.mechanics
+    m, now = believed.mechanics, extended.mechanics
+    table[0, :2] = now.mass, now.viscous  # with what was folded into them
     friction = believed.friction
     own = level_and_reach(friction.elements) if isinstance(friction, MaxwellSlip) else (0.0, 0.0)
     before = [m.mass, m.viscous, m.micro_damping, *own]
@@ -184,7 +219,7 @@ def _retuned(believed: Stage, final: Fitted) -> list[Retuned]:
     units = ("kg", "N s/m", "N s/m", "N", "m")
     found = []
     for name, unit, old, new, sd in zip(names, units, before, table[0], spread, strict=True):
-        half = 2.26 * float(sd)
+        half = float(np.hypot(2.26 * sd, MODEL * new))
         if old > 0 and abs(new / old - 1) > MOVED and abs(new - old) > half:
             found.append(
                 Retuned(name, float(old), Value(float(new), float(new - half), float(new + half), unit))

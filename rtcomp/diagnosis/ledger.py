@@ -23,6 +23,7 @@ from rtcomp.physics import Effect, Place
 from rtcomp.physics.coupled import LOAD_SHARE
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.physics.rows import new_rows
+from rtcomp.physics.speed import MicroDamping, ViscousFriction
 from rtcomp.physics.wires import SENSED, STEP, TIME
 from rtcomp.stage.balance import around_rows, forces
 from rtcomp.stage.stage import Stage
@@ -104,6 +105,9 @@ class Ledger:
         others = [e for e in others if e.name != "backlash"]
         speed = self.stage.mechanics.micro_damping_speed
         sides, tables = [], []
+        before: list[Effect] = []
+        if any(e.name == "load-dependent-friction" for e in modifiers):
+            before = sorted([*self._drive(), *drive], key=lambda e: e.order)
         for strip in self.motion.strips:
             x, v, a = kinematics(strip, self.motion.period, effects)
             given = self._given(strip, drive, x, v, a)
@@ -115,8 +119,12 @@ class Ledger:
                 v, rest = derivatives(x, self.motion.period)
                 moved = moved + LOAD_SHARE * (rest - a)
                 a = rest
-            columns = [moved, v, v * np.exp(-((v / speed) ** 2))]
-            columns += [self._element(strip, modifiers, r, x, v, a) for r in self.reaches]
+            units: list[Effect] = [
+                ViscousFriction(coefficient=1.0),
+                MicroDamping(coefficient=1.0, speed=speed),
+            ]
+            units += [MaxwellSlip([(1.0, float(r))]) for r in self.reaches]
+            columns = [moved, *(self._unit(strip, before, modifiers, one, x, v, a) for one in units)]
             tables.append(np.column_stack([columns[0], *map(around_rows, columns[1:])]))
         names = (MASS, VISCOUS, MICRO, *(f"reach {r:.3g}" for r in self.reaches))
         y, table = self.motion.smooth(sides), self.motion.smooth(tables)
@@ -134,15 +142,24 @@ class Ledger:
         chain = [e for e in self.stage.chain if e.place is Place.DRIVE]
         return [e for e in chain if not any(e is k for k in self.known)]
 
-    def _element(
-        self, strip: Strip, modifiers: Sequence[Effect], reach: float, x: Floats, v: Floats, a: Floats
+    def _unit(
+        self,
+        strip: Strip,
+        before: Sequence[Effect],
+        modifiers: Sequence[Effect],
+        one: Effect,
+        x: Floats,
+        v: Floats,
+        a: Floats,
     ) -> Floats:
-        chain = [*sorted(modifiers, key=lambda e: e.order), MaxwellSlip([(1.0, float(reach))])]
-        alone = forces(self.stage, chain, strip.time, x, v, a, strip.voltage, self.grain).friction
+        """Return the friction (N, every row) of one unit of the base with `modifiers` at work on it."""
+        chain = sorted([*modifiers, one], key=lambda e: e.order)
+        held = np.append(strip.voltage[:1], strip.voltage[:-1])
+        alone = forces(self.stage, [*before, *chain], strip.time, x, v, a, held, self.grain).friction
         if not modifiers:
             return alone
-        rest = forces(self.stage, chain[:-1], strip.time, x, v, a, strip.voltage, self.grain)
-        return alone - rest.friction
+        rest = [e for e in chain if e is not one]
+        return alone - forces(self.stage, [*before, *rest], strip.time, x, v, a, held, self.grain).friction
 
 
 def kinematics(strip: Strip, period: float, effects: Sequence[Effect] = ()) -> tuple[Floats, Floats, Floats]:

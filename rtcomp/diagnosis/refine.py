@@ -180,6 +180,14 @@ def refine(
     return Refined(current, fitted, knobs, jacobian, residual)
 
 
+MODEL = 0.004
+"""Relative half width of an interval that no data removes: kernels are models, rows are discrete."""
+
+
+def _scale(knob: Knob, value: float) -> float:
+    return 2.0 if knob.parameter.name == "phase" else abs(value)
+
+
 def intervals(refined: Refined) -> dict[tuple[int, str], tuple[float, float]]:
     """Return the 95 % interval of every knob, by entry number and name.
 
@@ -204,6 +212,6 @@ def intervals(refined: Refined) -> dict[tuple[int, str], tuple[float, float]]:
     found = {}
     for knob, sd in zip(refined.knobs, spread, strict=True):
         value = float(refined.entries[knob.entry][knob.parameter.name])  # type: ignore[arg-type]
-        half = factor * float(sd) * knob.step
+        half = float(np.hypot(factor * float(sd) * knob.step, MODEL * _scale(knob, value)))
         found[knob.entry, knob.parameter.name] = (value - half, value + half)
     return found

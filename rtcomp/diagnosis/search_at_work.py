@@ -86,8 +86,8 @@ def _sensing(s: Scene) -> list[Point]:
     total = float(s.time.max())
     points += [
         {"name": "sensor-drift", "drift": d * reach, "time_constant": t * total}
-        for d in (-5.0, -0.5, 0.5, 5.0)
-        for t in (0.1, 0.5)
+        for d in (-100.0, -15.0, -2.0, 2.0, 15.0, 100.0)
+        for t in (0.03, 0.15, 0.6)
     ]
     if _changes_once(s):
         points += [
