@@ -1,0 +1,120 @@
+"""Every benchmark as `make bench` runs it, at its shortest: it runs, and states the figures it is there for.
+
+Whether a figure meets its target is not judged here, except where it does not depend on the machine.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+TOP = Path(__file__).resolve().parents[2]
+BENCHMARKS = sorted(path.name for path in (TOP / "tools").glob("bench_*.py"))
+
+
+def bench(name: str, *arguments: object, timeout: float = 300.0) -> str:
+    done = subprocess.run(
+        [sys.executable, f"tools/{name}", *map(str, arguments)], cwd=TOP, capture_output=True, text=True,
+        timeout=timeout, stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def figures(folder: Path, name: str, *arguments: object) -> dict[str, dict[str, Any]]:
+    """Run a benchmark; check that table and JSON hold the same figures, all of them numbers; return them."""
+    path = folder / "figures.json"
+    printed = " ".join(bench(name, *arguments, "--json", path).split())
+    found: dict[str, dict[str, Any]] = {f["name"]: f for f in json.loads(path.read_text())["figures"]}
+    for figure in found.values():
+        assert math.isfinite(figure["value"]), figure
+        assert f"{figure['value']:.4g} {figure['unit']}".strip() in printed
+    return found
+
+
+def missed(found: dict[str, dict[str, Any]]) -> list[str]:
+    return [name for name, figure in found.items() if figure["met"] is False]
+
+
+def test_there_are_benchmarks() -> None:
+    assert len(BENCHMARKS) >= 7
+
+
+@pytest.mark.parametrize("name", BENCHMARKS)
+def test_it_says_what_it_takes(name: str) -> None:
+    assert "--json" in bench(name, "--help")
+
+
+def test_without_the_recording_it_skips() -> None:
+    assert bench("bench_measured.py").startswith("skipped: ")
+
+
+@pytest.mark.slow
+def test_a_joint_like_the_measured_one(tmp_path: Path) -> None:
+    from rtcomp.hysteresis.interval import IntervalBasis
+    from rtcomp.hysteresis.model import HysteresisModel
+
+    rate = 100.0
+    time = np.arange(0.0, 312.4, 1 / rate)
+    amplitude = np.interp(time, [0.0, 288.0, 290.0, 312.4], [2e-4, 6e-4, 7e-4, 7e-4])
+    position = amplitude * np.sin(2 * np.pi * 0.1 * time)
+    joint = HysteresisModel(IntervalBasis.over(30, 9e-4), np.linspace(800.0, 20.0, 30))
+    torque = joint.response(position)
+    noise = np.random.default_rng(3).standard_normal(time.size)
+    rows = np.column_stack([time, position, torque, torque + 1e-3 * noise])
+    file = tmp_path / "joint.csv.gz"
+    with gzip.open(file, "wt") as out:
+        head = "t_s,position_rad,effort_commanded_Nm,effort_measured_Nm"
+        np.savetxt(out, rows, "%.10g", ",", header=head, comments="")
+    found = figures(tmp_path, "bench_measured.py", file)
+    assert found["... relative to the peak"]["value"] < 5.0
+
+
+@pytest.mark.slow
+def test_the_papers_case(tmp_path: Path) -> None:
+    found = figures(tmp_path, "bench_paper.py", "--seeds", 1)
+    assert missed(found) == []
+    raw = found["raw RLS with noise, ten cycles, median"]["value"]
+    assert raw > 5.0 * found["with noise, ten cycles, median"]["value"]
+
+
+@pytest.mark.slow
+def test_tracking(tmp_path: Path) -> None:
+    assert missed(figures(tmp_path, "bench_tracking.py")) == []
+
+
+@pytest.mark.slow
+def test_speed(tmp_path: Path) -> None:
+    found = figures(tmp_path, "bench_speed.py", "--no-demo", "--seconds", 2)
+    assert found["faster than numpy, sample by sample"]["value"] > 20.0
+    assert found["1000 intervals over 20, fine motion"]["value"] < 4.0
+
+
+@pytest.mark.slow
+def test_a_killed_run_keeps_its_file(tmp_path: Path) -> None:
+    found = figures(tmp_path, "bench_kill.py", "--kills", 1)
+    for who in ("loop", "loop and recorder"):
+        assert found[f"{who} killed: files that open"]["value"] == 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.realtime
+def test_the_serial_link(tmp_path: Path) -> None:
+    for _ in range(3):
+        try:
+            found = figures(tmp_path, "bench_link.py", "--seconds", 4)
+        except AssertionError as error:
+            if "exchanges in a row" not in str(error):
+                raise
+            continue  # the kernel kept the samples back for longer than the watchdog's time
+        assert found["runs with every tick in the recording"]["value"] == 4.0
+        return
+    pytest.skip("this machine had no quiet quarter of a minute for a link in real time")
