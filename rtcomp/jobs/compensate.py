@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.identify import ALWAYS, follow, model_of
 from rtcomp.jobs.session import Run, Watch, check
+from rtcomp.stage.stage import Stage
 
 
 @dataclass(frozen=True)
@@ -33,12 +35,14 @@ class Compensated:
     """Two runs along one reference, without and with feedforward."""
 
     config: Configuration
-    model: HysteresisModel
-    """The model used; with learning, as it was at the end."""
+    model: HysteresisModel | None
+    """The model used; with learning, as it was at the end. None where a stage was fed forward."""
     without: Run
     with_it: Run
     error_without: Tracking
     error_with: Tracking
+    stage: Stage | None = None
+    """The stage fed forward, where it was not a model."""
 
     @property
     def improvement(self) -> float:
@@ -61,14 +65,23 @@ class Compensated:
 
 
 def compensate(
-    config: Configuration, model: HysteresisModel, *, out: Path | None = None, watch: Watch | None = None
+    config: Configuration,
+    model: HysteresisModel | None = None,
+    *,
+    stage: Stage | None = None,
+    out: Path | None = None,
+    watch: Watch | None = None,
 ) -> Compensated:
     """Follow the reference of the section ``compensate`` twice, without and with feedforward.
 
-    With `out`, recordings are written there (without.h5, with.h5).
+    What is fed forward is `model` with the inertia and known forces of the configured stage, or, where it is
+    given, the whole chain of `stage`. With `out`, recordings are written there (without.h5, with.h5). Raises
+    ConfigError for a stage of another kind of axis, or where it is to go with learning.
     """
     check(config, "compensate")
     section = config.run.compensate
+    if stage is not None:
+        check_stage(config, stage)
     learn = ALWAYS if section.learn else None
     without = follow(config, "compensate", model=model, path=_in(out, "without.h5"), watch=watch)
     with_it = follow(
@@ -76,6 +89,7 @@ def compensate(
         "compensate",
         learn=learn,
         model=model,
+        stage=stage,
         feedforward_from=0.0,
         path=_in(out, "with.h5"),
         watch=watch,
@@ -84,12 +98,26 @@ def compensate(
         model = model_of(config, with_it.tick, with_it.columns["position"])
     return Compensated(
         config,
-        model,
+        model if stage is None else None,
         without,
         with_it,
         Tracking.of(without, section.settle),
         Tracking.of(with_it, section.settle),
+        stage,
     )
+
+
+def check_stage(config: Configuration, stage: Stage) -> None:
+    """Raise ConfigError where `stage` cannot be fed forward on the configured axis."""
+    if stage.axis != config.stage.axis:
+        raise ConfigError(
+            f"the stage to feed forward is {stage.axis}, the axis of {config.path} is "
+            f"{config.stage.axis}; give the stage of this axis"
+        )
+    if config.run.compensate.learn:
+        raise config.file.error(
+            ("compensate", "learn"), "is true; a stage is fed forward as it is: leave learn out, or the stage"
+        )
 
 
 def live(

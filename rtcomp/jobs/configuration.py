@@ -159,6 +159,8 @@ class Configuration:
     run: RunFile
     stage: Stage
     file: YamlFile
+    plant: Stage | None = None
+    """What the driver ``simulated`` simulates, where that is not what is believed."""
 
     @classmethod
     def load(cls, path: str | Path) -> Configuration:
@@ -288,4 +290,9 @@ class Configuration:
 
     def changed(self, **sections: Any) -> Configuration:
         """Return the configuration with whole top-level sections replaced."""
-        return Configuration.of(replace(self.file, data={**self.file.data, **sections}))
+        changed = Configuration.of(replace(self.file, data={**self.file.data, **sections}))
+        return replace(changed, plant=self.plant)
+
+    def simulating(self, plant: Stage) -> Configuration:
+        """Return the configuration with `plant` simulated behind its back; the loop goes on believing its own."""
+        return replace(self, plant=plant)

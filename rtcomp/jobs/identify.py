@@ -15,6 +15,7 @@ from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.hysteresis.prior import non_increasing
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.judge import Friction, Judgement, friction_of, judge, learning_curve, reached
+from rtcomp.jobs.lead import NOTHING, lead_volts
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
 from rtcomp.jobs.session import Run, Watch, check, make_device, make_tick, run_loop, stopped
 from rtcomp.kernels import Floats
@@ -22,6 +23,7 @@ from rtcomp.loop.device import Device
 from rtcomp.loop.tick import Tick
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.balance import bandwidth, known_force, zero_phase
+from rtcomp.stage.stage import Stage
 
 ALWAYS = (0.0, float("inf"))
 
@@ -117,6 +119,7 @@ def follow(
     *,
     learn: tuple[float, float] | None = None,
     model: HysteresisModel | None = None,
+    stage: Stage | None = None,
     feedforward_from: float | None = None,
     feedforward_fade: float = 0.0,
     path: Path | None = None,
@@ -125,7 +128,8 @@ def follow(
 ) -> Run:
     """Run the loop along the reference of `section` to its end, with or without learning and feedforward.
 
-    A real device is relaxed first, and followed from where it stands. `partial` as `run_loop` takes it.
+    A real device is relaxed first, and followed from where it stands. With `stage` the whole feedforward is
+    that stage's (`lead.lead_volts`) in place of the model's. `partial` as `run_loop` takes it.
     """
     device = make_device(config)
     start = None
@@ -142,6 +146,10 @@ def follow(
         feedforward_from=feedforward_from,
         feedforward_fade=feedforward_fade,
     )
+    if stage is not None:
+        model = NOTHING
+        plan = replace(plan, lead=lead_volts(stage, plan.reference, plan.period, plan.ticks, plan.delay_ticks,
+                                             clock=not config.real_device))  # fmt: skip
     tick = make_tick(config, device.delay_ticks, model)
     return run_loop(config, plan, device, tick, path=path, watch=watch, partial=partial)
 

@@ -42,6 +42,9 @@ class ReferencePlan:
     learn: tuple[float, float] | None = None
     feedforward_from: float | None = None
     feedforward_fade: float = 0.0
+    lead: Floats | None = None
+    """V, (ticks,): the whole feedforward of each tick (`lead.lead_volts`), in place of the stage's inertia
+    and known forces. Made beforehand as one piece, since friction remembers."""
 
     def rows(self, first: int, count: int) -> Floats:
         """Return rows `first` to `first + count`, shape (count, PLAN_WIDTH)."""
@@ -51,7 +54,10 @@ class ReferencePlan:
         acts = t + (self.delay_ticks + HOLD) * self.period
         x, v, a = self.reference.evaluate(acts)
         out[:, LEAD_POSITION] = x
-        out[:, LEAD_FORCE] = self.stage.mass * a + known_force(self.stage, acts, x, v)
+        if self.lead is not None:
+            out[:, LEAD_FORCE] = self.stage.force_constant * self.lead[first : first + count]
+        else:
+            out[:, LEAD_FORCE] = self.stage.mass * a + known_force(self.stage, acts, x, v)
         before = t - self.period
         x, v, _ = self.reference.evaluate(before)
         out[:, KNOWN] = known_force(self.stage, before, x, v, viscous=False)

@@ -13,6 +13,7 @@ from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.identify import bridged
 from rtcomp.jobs.simulate import on_reference
 from rtcomp.kernels import Floats
+from rtcomp.recording.acted import as_acted
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.balance import force_balance
 from rtcomp.stage.stage import Stage
@@ -46,13 +47,15 @@ def replay(stage: Stage, recording: Recording, bandwidth_hz: float | None = None
 
     Both sides are compared below `bandwidth_hz` (default a tenth of the rate, at most 100 Hz).
     """
+    commanded = recording.voltage
+    recording = as_acted(recording)
     if len(recording) < 64:
         raise RecordingError(f"{recording.path}: {len(recording)} rows; a force balance needs at least 64")
     position = bridged(recording)
     balance = force_balance(stage, recording.time, position, recording.voltage, bandwidth_hz)
     columns = {
         "time": recording.time,
-        "voltage": recording.voltage,
+        "voltage": commanded,
         "position": recording.position,
         "force_drive": balance.force_drive,
         "force_motion": balance.force_motion,

@@ -100,7 +100,7 @@ def make_device(
     `start` (m) and `substeps` are for simulated stages.
     """
     bench = Bench(
-        stage=config.stage,
+        stage=config.plant or config.stage,
         period=config.period,
         seed=config.run.seed,
         realtime=config.wall_clock,

@@ -14,12 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtcomp.kernels import Floats, call_effect, compiled
+from rtcomp.kernels import Floats, compiled
 from rtcomp.physics import Effect, Place, wires
 from rtcomp.physics.program import Program, run_chain
 from rtcomp.physics.wires import (
     ACCELERATION,
-    COUNT,
     DRIVE,
     FRICTION,
     GAIN,
@@ -36,6 +35,7 @@ from rtcomp.physics.wires import (
     VELOCITY,
     VOLTS,
 )  # fmt: skip
+from rtcomp.stage.inverse import undone
 from rtcomp.stage.stage import Stage
 
 _STEADY = {"drive-offset", "drive-deadband", "drive-saturation", "drive-gain", "drive-force"}
@@ -151,8 +151,8 @@ def force_balance(
 
     The force around a row is the mean of those before and after it, as the second difference of position
     is of the accelerations. Friction's memory and the acceleration come from the position as it was
-    measured, the velocity from below three times `bandwidth_hz`, and both sides are compared below it, forward
-    and backward filtered: no delay. What the stage's sensor does to a reading is undone first.
+    measured, the velocity from below three times `bandwidth_hz`, and both sides are compared below it,
+    forward and backward filtered: no delay. What the stage's sensor does to a reading is undone first.
     """
     period = float((time[-1] - time[0]) / (time.size - 1))
     cut = bandwidth(1.0 / period) if bandwidth_hz is None else bandwidth_hz
@@ -185,8 +185,7 @@ def true_position(stage: Stage, time: Floats, reading: Floats) -> Floats:
     for effect in reversed([e for e in stage.chain if e.place is Place.SENSOR]):
         delay = effect.values.get("delay", 0.0)
         if effect.inverse is not None:
-            p, s = effect.vector(), effect.initial_state()
-            _undo(effect.inverse.address, np.append(p, 0.0), np.append(s, 0.0), time, position)
+            position = undone(effect, time, position, SENSED)
         elif delay > 0.0:
             from scipy.interpolate import CubicSpline
 
@@ -194,23 +193,12 @@ def true_position(stage: Stage, time: Floats, reading: Floats) -> Floats:
     return position
 
 
-@compiled
-def _undo(address: int, p: Floats, s: Floats, time: Floats, position: Floats) -> None:
-    w = np.zeros(COUNT)
-    for k in range(position.size):
-        w[STEP] = time[k] - w[TIME] if k > 0 else 0.0
-        w[TIME] = time[k]
-        w[SENSED] = position[k]
-        call_effect(address, p.ctypes.data, s.ctypes.data, w.ctypes.data)
-        position[k] = w[SENSED]
-
-
 def around_rows(force: Floats) -> Floats:
-    """Return the mean of a smooth force (N, (K,)) around each row, as the second difference of position sees it.
+    """Return the mean of a smooth force (N, (K,)) around each row, as second differences of position see it.
 
     The second difference weighs accelerations by a triangle from the row before to the row after; so weighed,
-    a force that is smooth between rows is (F[k-1] + 10 F[k] + F[k+1]) / 12 (Numerov 1924), right to the fourth
-    order. At a tenth of the rate the middle value alone would be 3 % too large.
+    a force that is smooth between rows is (F[k-1] + 10 F[k] + F[k+1]) / 12 (Numerov 1924), right to the
+    fourth order. At a tenth of the rate the middle value alone would be 3 % too large.
     """
     mean = np.array(force)
     mean[1:-1] = (force[:-2] + 10.0 * force[1:-1] + force[2:]) / 12.0
