@@ -53,11 +53,12 @@ def diagnose(
     from dataclasses import replace
 
     from rtcomp.diagnosis.admit import admit
+    from rtcomp.recording.acted import as_acted
     from rtcomp.recording.reader import read
     from rtcomp.stage.stage import Stage
 
     stage = Stage.load(stage_file)
-    data = [read(path, mapping, rate_hz=rate) for path in recordings]
+    data = [as_acted(read(path, mapping, rate_hz=rate)) for path in recordings]
     several = len(data) > 1
     notes = [f"in {r.path.name}: {note}" if several else note for r in data for note in r.notes]
     notes += admit(stage, data)

@@ -1,4 +1,4 @@
-"""The circle closed: an effect hidden in the plant, compensated in ignorance, diagnosed, compensated again."""
+"""The circle closed: an effect hidden in the plant, compensated unaware, diagnosed, compensated again."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from rtcomp.diagnosis.diagnose import diagnose
 from rtcomp.diagnosis.result import Diagnosis
+from rtcomp.errors import LimitError
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.jobs.compensate import Tracking
 from rtcomp.jobs.configuration import Configuration
@@ -88,8 +89,6 @@ HIDDEN: dict[str, Draw] = {
 """What may be hidden, and how its size is drawn."""
 CLOCKED = frozenset({"tonal-disturbance"})
 """Those that go by the stage's own time, which is known in simulation only."""
-RESTING = 1.0
-"""s at the start that tracking errors leave out."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +153,10 @@ def scale_of(config: Configuration, model: HysteresisModel) -> Scale:
 
 
 def draw(seed: int, scale: Scale, *, clock: bool = True) -> Entry:
-    """Return an effect drawn at random, its size too; with `clock` false none that goes by the stage's time."""
+    """Return an effect drawn at random, its size too.
+
+    With `clock` false none that goes by the stage's own time.
+    """
     random = np.random.default_rng(seed)
     names = [name for name in HIDDEN if clock or name not in CLOCKED]
     name = str(random.choice(names))
@@ -172,8 +174,54 @@ def with_effect(stage: Stage, entry: Entry) -> Stage:
     return stage.with_changes(stage={"effects": [*effects, entry]})
 
 
+def searching(config: Configuration, seconds: float | None = None) -> Configuration:
+    """Return the configuration with a motion to diagnose in the place of the one of ``compensate``.
+
+    A multisine as far as that motion goes and up to about three times as fast, from slow strokes over the
+    whole length to small fast reversals; `seconds` long, else two and a half of its slowest periods. Where
+    limits do not allow it, the configuration as it is.
+    """
+    reference = config.reference("compensate")
+    low, high = reference.span
+    half = 0.5 * (high - low)
+    turn = reference.peak_speed / (2.0 * np.pi * half)
+    band = {"low": _neat(0.2 * turn), "high": _neat(4.0 * turn), "count": 7}
+    section = {
+        "kind": "multisine", "amplitude": _neat(half), "band": band, "offset": 0.5 * (high + low),
+        "duration": float(seconds or max(20.0, np.ceil(2.5 / band["low"]))),
+    }  # fmt: skip
+    given = config.file.data.get("compensate", {})
+    changed = config.changed(compensate={**given, "reference": section, "learn": False})
+    try:
+        changed.reference("compensate")
+    except LimitError:
+        return config
+    return changed
+
+
+def _neat(value: float) -> float:
+    """Return the value to two digits: a configuration is read by people."""
+    return float(f"{value:.2g}")
+
+
+def compensated(
+    config: Configuration,
+    name: str,
+    model: HysteresisModel | None = None,
+    stage: Stage | None = None,
+    *,
+    out: Path | None = None,
+    watch: Watch | None = None,
+) -> Run:
+    """Follow the reference of ``compensate``, `model` or `stage` fed forward; recorded in `out` as `name`."""
+    path = None if out is None else out / f"{name}.h5"
+    return follow(
+        config, "compensate", model=model, stage=stage, feedforward_from=0.0, path=path, watch=watch
+    )
+
+
 def close_circle(
-    ordinary: Configuration,
+    ordinary: Run,
     concealing: Configuration,
     hidden: Entry,
     model: HysteresisModel,
@@ -182,27 +230,16 @@ def close_circle(
     watch: Watch | None = None,
     progress: Callable[[float, str], None] | None = None,
 ) -> Circle:
-    """Compensate on `ordinary`, then twice on `concealing`, before and after diagnosing the first of these.
+    """Compensate twice on a plant with the effect `hidden`, before and after diagnosing the first of both.
 
-    The configurations differ in their plant only, which has the effect `hidden` in the second. With `out`
-    recordings are written there (ordinary.h5, hidden.h5, diagnosed.h5).
+    `concealing` believes what it believed when `ordinary` was run with `model` on the plant without the
+    effect; only its plant is another. With `out` recordings are written there (hidden.h5, diagnosed.h5).
     """
-
-    def run(config: Configuration, name: str, stage: Stage | None = None) -> Run:
-        path = None if out is None else out / f"{name}.h5"
-        return follow(
-            config, "compensate", model=model, stage=stage, feedforward_from=0.0, path=path, watch=watch
-        )
-
-    first = run(ordinary, "ordinary")
-    ignorant = run(concealing, "hidden")
-    found = diagnose(
-        believed(ordinary.stage, model),
-        [recording_of(ignorant, out and out / "hidden.h5")],
-        progress=progress,
-    )
-    extended = run(concealing, "diagnosed", found.stage)
-    return Circle(hidden, first, ignorant, found, extended, ordinary.run.compensate.settle)
+    ignorant = compensated(concealing, "hidden", model, out=out, watch=watch)
+    recording = recording_of(ignorant, None if out is None else out / "hidden.h5")
+    found = diagnose(believed(concealing.stage, model), [recording], progress=progress)
+    extended = compensated(concealing, "diagnosed", stage=found.stage, out=out, watch=watch)
+    return Circle(hidden, ordinary, ignorant, found, extended, concealing.run.compensate.settle)
 
 
 def recording_of(run: Run, path: Path | None) -> Recording:

@@ -294,5 +294,5 @@ class Configuration:
         return replace(changed, plant=self.plant)
 
     def simulating(self, plant: Stage) -> Configuration:
-        """Return the configuration with `plant` simulated behind its back; the loop goes on believing its own."""
+        """Return the configuration with `plant` simulated; the loop goes on believing its own stage."""
         return replace(self, plant=plant)

@@ -39,11 +39,13 @@ def tracking_figure(
     *,
     unit: str = "m",
     points: int = c.POINTS,
+    names: tuple[str, str] = (_NAMES["without"], _NAMES["with"]),
 ) -> go.Figure:
     """Return the tracking error (reference minus position) with and without compensation against time.
 
     Each is (time in s, error in `unit`) or None. The upper panel has both on one scale; the lower one, drawn
-    where both are given, shows the compensated error on its own scale. Rms and peak stand in the legend.
+    where both are given, shows the compensated error on its own scale. Rms and peak stand in the legend,
+    beside the `names` of the two.
     """
     runs: dict[str, tuple[Floats, Floats]] = {}
     for key, run in (("without", without), ("with", compensated)):
@@ -60,7 +62,7 @@ def tracking_figure(
         kept = peak_indices([e], points)
         size = rms_and_peak(e)
         rms, peak = (written(value, unit, printed=True) for value in size)
-        label = f"{_NAMES[key]}: rms {rms}, peak {peak}"
+        label = f"{names[key == 'with']}: rms {rms}, peak {peak}"
         x = t[kept] * in_time.factor
         c.line(figure, x, e[kept] * drawn_in.factor, label, _COLOURS[key], width=1.4)
         c.note_thinned(figure, len(kept), len(t))
@@ -70,7 +72,7 @@ def tracking_figure(
                 height=560,
                 yaxis={"domain": [0.47, 1.0]},
                 yaxis2=c.axis(
-                    c.titled("with, enlarged", own.unit), domain=[0.0, 0.37], anchor="x", hoverformat=".4g"
+                    c.titled("enlarged", own.unit), domain=[0.0, 0.37], anchor="x", hoverformat=".4g"
                 ),
                 xaxis={"anchor": "y2"},
             )
