@@ -19,9 +19,12 @@ from running import Plant
 from rtcomp.cli.main import COMMANDS
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.model import HysteresisModel
+from rtcomp.recording.reader import load
 
 PROJECT = Path(__file__).resolve().parents[2]
-SLOW = ("--serial", "--port")
+SLOW = ("--serial", "--port", "rtcomp trial")
+ONCE = ("demo", "diagnose", "trial")
+"""Commands that take long: run with `--json` only."""
 
 
 def helped(*command: str) -> list[str]:
@@ -47,6 +50,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run = rtcomp("simulate", "stage.yaml", "--out", "first", at=folder)
     assert run.returncode == 0, run.stderr
     (folder / "first" / "recording.h5").rename(folder / "run.h5")
+    for config, seconds in (("stage.yaml", 6), ("configs/leuven.yaml", 10)):  # long enough for a diagnosis
+        name = Path(config).stem
+        run = rtcomp("simulate", config, "--seconds", seconds, "--out", name, at=folder)
+        assert run.returncode == 0, run.stderr
+    whole = load(folder / "stage" / "recording.h5").columns
+    for part, rows in (("a.csv", slice(0, 3000)), ("b.csv", slice(3000, None))):
+        text = {"time": whole["time"], "qm": whole["position"], "vir": whole["voltage"]}
+        write(folder / part, {key: value[rows] for key, value in text.items()})
     columns = motion()
     named = {"time": columns["time"], "qm": columns["position"], "vir": columns["voltage"]}
     write(folder / "log.mat", named)
@@ -78,6 +89,10 @@ def ready(folder: Path, example: str) -> list[str]:
     words = shlex.split(example)[1:]
     if "out/demo/recording.h5" in words:
         (folder / "out" / "demo" / "recording.h5").write_bytes((folder / "run.h5").read_bytes())
+    if words[0] == "diagnose" and "configs/leuven.yaml" in words:  # a recording of that stage
+        words[words.index("run.h5")] = "leuven/recording.h5"
+    if words[0] == "trial":
+        words[words.index("--cases") + 1] = "1"
     for word in words:
         if word.endswith("model.yaml"):
             (folder / word).write_bytes((folder / "model.yaml").read_bytes())
@@ -96,7 +111,7 @@ def ready(folder: Path, example: str) -> list[str]:
 )
 def test_an_example_runs_as_it_stands(folder: Path, example: str) -> None:
     words = ready(folder, example)
-    for as_json in (False, True) if "--port" not in words and "demo" not in words else (True,):
+    for as_json in (False, True) if "--port" not in words and words[0] not in ONCE else (True,):
         given = [*words, "--json"] if as_json and "--json" not in words else words
         if words[0] == "convert":
             (folder / words[2]).unlink(missing_ok=True)
@@ -107,7 +122,7 @@ def test_an_example_runs_as_it_stands(folder: Path, example: str) -> None:
                 run = rtcomp(*given, at=folder)
                 plant.stop()
         else:
-            run = rtcomp(*given, at=folder, timeout=400.0)
+            run = rtcomp(*given, at=folder, timeout=900.0)
         assert (run.returncode, run.stderr) == (0, ""), run.stdout
         if "--json" in given:
             assert only_finite(run.stdout)
