@@ -46,7 +46,9 @@ def moving(config: Configuration, plant: Stage, virtual: bool, folder: Path) -> 
 @click.command()
 @click.option("--virtual", is_flag=True, help="Virtual time with one tick of delay instead of the link.")
 @click.option("--seconds", type=float, help="Length of each run.")
-@click.option("--only", help="One effect instead of all four.")
+@click.option(
+    "--only", type=click.Choice([h["name"] for h in HIDDEN]), help="One effect instead of all four."
+)
 @click.option("--json", "path", type=click.Path(path_type=Path))
 def main(virtual: bool, seconds: float | None, only: str | None, path: Path | None) -> None:
     config = d.searching(load(shipped("leuven.yaml")), seconds)
@@ -60,8 +62,10 @@ def main(virtual: bool, seconds: float | None, only: str | None, path: Path | No
             if only is not None and hidden["name"] != only:
                 continue
             plant = d.with_effect(config.stage, hidden)
+            out = folder / hidden["name"]
+            out.mkdir()
             with moving(config, plant, virtual, folder) as concealing:
-                circle = d.close_circle(ordinary, concealing, hidden, model, out=folder)
+                circle = d.close_circle(ordinary, concealing, hidden, model, out=out)
             believed, before, after = circle.errors
             what = hidden["name"]
             named = ", ".join(" or ".join(e.names) for e in circle.found.effects) or "nothing"
