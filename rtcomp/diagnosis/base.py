@@ -8,7 +8,7 @@ import numpy as np
 
 from rtcomp import physics
 from rtcomp.diagnosis.blocks import Bounds
-from rtcomp.diagnosis.ledger import Ledger, System, grid_of
+from rtcomp.diagnosis.ledger import BIASES, Ledger, System, grid_of
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect
@@ -31,6 +31,7 @@ def bounds_of(
     springs, not negative, so that the virgin curve rises ever less steeply.
     """
     m = stage.mechanics
+    biased = any(e.get("name") in BIASES for e in m.effects)
     low, high = np.zeros(size), np.full(size, np.inf)
     own = {"mass": stage.mass, "viscous": m.viscous, "micro_damping": m.micro_damping}
     for i, (name, value) in enumerate(own.items()):
@@ -38,6 +39,8 @@ def bounds_of(
             low[i] = 0.0 if name == "mass" else -np.inf
         else:
             low[i], high[i] = value * (1 - slack), value * (1 + slack)
+    if biased:
+        low[-1] = -np.inf
     return Bounds(low, high)
 
 

@@ -22,12 +22,14 @@ from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.stage.stage import Stage
 
-MOST = 3
+MOST = 4
 """Entries named at the most: beyond, a recording does not carry the decision."""
 SHORTLIST = 7
 QUICK, CONTENDERS = 2, 3
 """Steps of refinement for the whole short list, and how many of it are refined to the end."""
 LEAST_SHARE = 0.04
+BESIDE = 0.15
+"""Part of what the entries before it explain, from which on a further entry counts beside them."""
 ENOUGH, ENOUGH_SHAPELESS = 0.8, 0.6
 """Part of the excess over the floor that names must explain together, else none is given."""
 REST = 0.5
@@ -67,14 +69,14 @@ class Decision:
     first_look: list[Screened] = field(default_factory=list)
     first_refined: dict[str, float] = field(default_factory=dict)
 
-    def abstain_if_poor(self, floor: Floats) -> None:
+    def abstain_if_poor(self, floor: Floats, still_structured: bool) -> None:
         """Take the names back where together they leave too much: the nearest name would be the wrong one."""
         before, after = float(self.base.errors.sum()), float(self.refined.errors.sum())
         excess = max(before - float(floor.sum()), 1e-300)
         explained = (before - after) / excess
         shapeless = all(c.names[0] in SHAPELESS for c in self.choices)
         enough = ENOUGH_SHAPELESS if shapeless else ENOUGH
-        if explained < enough and after > 4.0 * ABOVE_FLOOR * float(floor.sum()):
+        if explained < enough and after > 4.0 * ABOVE_FLOOR * float(floor.sum()) and still_structured:
             self.choices = []
 
 
@@ -98,7 +100,7 @@ def decide(
             decision.first_look, decision.first_refined = looked, gains
         if best is None or not _worth_it(current.errors, best.errors, floor):
             break
-        if entries and not _settles_the_rest(current.errors, best.errors, floor):
+        if entries and not _settles_the_rest(base.errors, current.errors, best.errors, floor):
             break
         explained = float(current.errors.sum() - best.errors.sum())
         names, probability = _alike(best, rest, current)
@@ -181,9 +183,11 @@ def _worth_it(before: Floats, after: Floats, floor: Floats) -> bool:
     )
 
 
-def _settles_the_rest(before: Floats, after: Floats, floor: Floats) -> bool:
-    """Tell whether a further entry explains what is left, rather than trimming how the first is modelled."""
-    return float(before.sum() - after.sum()) > REST * float(max(before.sum() - floor.sum(), 0.0))
+def _settles_the_rest(first: Floats, before: Floats, after: Floats, floor: Floats) -> bool:
+    """Tell whether a further entry has a weight of its own, not one that trims how the first is modelled."""
+    gained = float(before.sum() - after.sum())
+    left = float(max(before.sum() - floor.sum(), 0.0))
+    return gained > REST * left or gained > BESIDE * float(first.sum() - before.sum())
 
 
 def _alike(best: Refined, rest: Sequence[Refined], current: Fitted) -> tuple[list[str], float]:

@@ -28,6 +28,8 @@ NEGLIGIBLE = 0.006
 """Relative force error up to which a recording is held to agree, whatever its noise promises."""
 MOVED = 0.02
 """Relative change of a parameter that is worth reporting."""
+STRUCTURED = 0.3
+"""Part of the remaining mismatch that depends on one axis, from which on names are taken back."""
 MODEL = 0.005
 """Relative half width of an interval that no amount of data removes: kernels and friction grid are models."""
 UNSEEABLE = ("sensor-scale",)
@@ -55,7 +57,10 @@ def diagnose(
     least = np.maximum(floor, NEGLIGIBLE**2 / ABOVE_FLOOR * base.system.blocks.power[base.ledger.seen])
     decision = decide(stage, motion, base, least, say)
     final = decision.refined.fitted
-    decision.abstain_if_poor(least)
+    if decision.choices:
+        # Names that leave a clear dependence on something are the nearest names, not the right ones.
+        left = locate(motion, final.residual, None, seed)
+        decision.abstain_if_poor(least, any(p.share > STRUCTURED for p in left))
     entries_found = [dict(e) for e in decision.refined.entries] if decision.choices else []
     if not decision.choices:
         final = base

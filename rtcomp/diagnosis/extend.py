@@ -35,10 +35,23 @@ def extended_stage(believed: Stage, fitted: Fitted, entries: Sequence[Entry]) ->
         mechanics["friction"] = elements
     else:
         mechanics.pop("friction", None)
+    if fitted.ledger.biased:
+        _shift_bias(mechanics["effects"], float(c[FIXED + reaches.size]), believed.force_constant)
     mechanics["effects"] = [*mechanics.get("effects", []), *[dict(e) for e in entries]]
     if not mechanics["effects"]:
         del mechanics["effects"]
     return Stage.from_dict(data)
+
+
+def _shift_bias(effects: list[dict[str, Any]], force: float, force_constant: float) -> None:
+    """Add `force` (N) to the first constant force or offset among `effects`."""
+    for effect in effects:
+        if effect["name"] in ("constant-force", "gravity"):
+            effect["force"] = float(effect.get("force", 0.0)) + force
+            return
+        if effect["name"] == "drive-offset":
+            effect["offset"] = float(effect["offset"]) + force / force_constant
+            return
 
 
 def level_and_reach(elements: Sequence[Sequence[float]]) -> tuple[float, float]:

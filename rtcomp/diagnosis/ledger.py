@@ -28,7 +28,8 @@ from rtcomp.physics.wires import SENSED, STEP, TIME
 from rtcomp.stage.balance import around_rows, forces
 from rtcomp.stage.stage import Stage
 
-MASS, VISCOUS, MICRO = "mass", "viscous", "micro_damping"
+MASS, VISCOUS, MICRO, BIAS = "mass", "viscous", "micro_damping", "bias"
+BIASES = ("constant-force", "gravity", "drive-offset")
 PARTS = 8
 GRID = 14
 """Reaches of the grid where the believed friction is not a short list of elements."""
@@ -64,6 +65,11 @@ class Ledger:
         bank = friction.elements if isinstance(friction, MaxwellSlip) else [(1.0, float(self.reaches.mean()))]
         self._believed = np.array([k for k, _ in bank]), np.array([r for _, r in bank])
         self._plain: System | None = None
+
+    @property
+    def biased(self) -> bool:
+        """Whether the believed stage has a constant force or offset."""
+        return any(e.get("name") in BIASES for e in self.stage.mechanics.effects)
 
     def system(self, effects: Sequence[Effect] = (), adders: Sequence[Effect] = ()) -> System:
         """Return the system with `effects` at work, and one more column for each of `adders` (unit size)."""
@@ -127,6 +133,10 @@ class Ledger:
             columns = [moved, *(self._unit(strip, before, modifiers, one, x, v, a) for one in units)]
             tables.append(np.column_stack([columns[0], *map(around_rows, columns[1:])]))
         names = (MASS, VISCOUS, MICRO, *(f"reach {r:.3g}" for r in self.reaches))
+        if self.biased:
+            # A believed bias is a number like the others: it is refitted with them.
+            names = (*names, BIAS)
+            tables = [np.column_stack([t, -np.ones(t.shape[0])]) for t in tables]
         y, table = self.motion.smooth(sides), self.motion.smooth(tables)
         return System(y, table, names, Blocks.of(table, y, self.block, BLOCKS))
 
