@@ -21,8 +21,8 @@ left (60 resonance; 70 backlash, after which MOVED and VELOCITY are the load's).
     20  stribeck                        REACH  (the yield level at equal stiffness)
         load-dependent-friction         REACH
         stiction-ageing                 REACH
-        position-dependent-friction     SCALE  (the whole force)
-        friction-drift                  SCALE
+        position-dependent-friction     REACH
+        friction-drift                  SCALE  (the whole force)
     30  creep                           MOVED less what the contacts creep
     40  asymmetric-friction             MOVED larger forward than backward
     50  models and speed laws           add to FRICTION; a model leaves GRIP, GRIP_LEVEL, GRIP_STIFFNESS

@@ -124,7 +124,7 @@ def test_starts_at_rest_never_jumps_and_keeps_its_bounds(entry):
 @given(any_motion)
 def test_bounds_are_reached(entry):
     r = Reference.from_dict(entry)
-    end = max(r.duration, r.delay + r.fade + (r.period or 0.0))
+    end = max(r.duration, r.delay + r.fade + 2.0 * (r.period or 0.0))  # the way to a cycle, and the cycle
     x, v, a = r.evaluate(np.linspace(0.0, end, 400001))
     assert np.abs(v).max() >= 0.98 * r.peak_speed
     assert x.max() >= r.span[1] - 0.01 * np.ptp(r.span) and x.min() <= r.span[0] + 0.01 * np.ptp(r.span)
