@@ -15,7 +15,6 @@ from command import refused, rtcomp, write
 
 from rtcomp.stage.stage import Stage
 
-pytest.importorskip("rtcomp.diagnosis.diagnose", reason="the engine of the diagnosis is not there yet")
 
 CONFIG = """\
 stage:

@@ -125,7 +125,6 @@ def test_options_that_make_no_sense_are_refused(
 
 
 def test_results_that_stand_there_are_not_overwritten_unasked(recorded: Columns, folder: Path) -> None:
-    pytest.importorskip("rtcomp.diagnosis.diagnose", reason="the engine of the diagnosis is not there yet")
     write(folder / "log.csv", recorded)
     before = listing(folder)
     line = refused("diagnose", "log.csv", "--stage", "stage.yaml", "--out", "out", at=folder)
