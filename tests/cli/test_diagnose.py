@@ -15,7 +15,6 @@ from command import refused, rtcomp, write
 
 from rtcomp.stage.stage import Stage
 
-
 CONFIG = """\
 stage:
   mass: 2.0
