@@ -58,9 +58,9 @@ def with_circle(page: Page, circle: Circle, unit: str) -> Page:
     verdict = [page.verdict] if isinstance(page.verdict, str) else list(page.verdict)
     ran = "wrongly " if judged(circle) == "wrong" else ""
     verdict.append(
-        f"Then {circle.hidden['name']} ({described(circle.hidden)}) was hidden in the stage, and the tracking "
-        f"error rose from {si(believed.rms, unit)} to {si(before.rms, unit)}. The diagnosis of that recording {ran}named "
-        f"{named(circle)}; with it fed forward the error is {si(after.rms, unit)}."
+        f"Then {circle.hidden['name']} ({described(circle.hidden)}) was hidden in the stage, and the error "
+        f"rose from {si(believed.rms, unit)} to {si(before.rms, unit)}. The diagnosis of that recording "
+        f"{ran}named {named(circle)}; with it fed forward the error is {si(after.rms, unit)}."
     )
     bars = {name: Figures(e.rms, e.peak) for name, e in zip(RUNS, circle.errors, strict=True)}
     errors = [run.tracking_error(circle.settle) for run in (circle.ignorant, circle.extended)]
