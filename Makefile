@@ -13,7 +13,7 @@ export PYTHON
 help: ## list what can be made
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-demo: $(RUN) ## identify and compensate a simulated stage; leaves out/demo/report.html
+demo: $(RUN) ## identify, compensate, hide an effect and find it; leaves out/demo/report.html
 	$(BIN)/rtcomp demo --out out/demo --force $(ARGS)
 
 test: $(DEV) ## every quick test

@@ -233,12 +233,12 @@ def close_circle(
     """Compensate twice on a plant with the effect `hidden`, before and after diagnosing the first of both.
 
     `concealing` believes what it believed when `ordinary` was run with `model` on the plant without the
-    effect; only its plant is another. With `out` recordings are written there (hidden.h5, diagnosed.h5).
+    effect; only its plant is another. With `out` recordings are written there (hidden.h5, found.h5).
     """
     ignorant = compensated(concealing, "hidden", model, out=out, watch=watch)
     recording = recording_of(ignorant, None if out is None else out / "hidden.h5")
     found = diagnose(believed(concealing.stage, model), [recording], progress=progress)
-    extended = compensated(concealing, "diagnosed", stage=found.stage, out=out, watch=watch)
+    extended = compensated(concealing, "found", stage=found.stage, out=out, watch=watch)
     return Circle(hidden, ordinary, ignorant, found, extended, concealing.run.compensate.settle)
 
 
