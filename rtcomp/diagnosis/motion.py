@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rtcomp.kernels import Floats
+from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.recording.reader import Recording
+from rtcomp.stage.balance import zero_phase
 from rtcomp.stage.stage import Stage
 
-MOST_ROWS = 120_000
+MOST_ROWS = 80_000
 """Rows that a diagnosis works on; of longer recordings it takes windows, evenly spread."""
 WINDOWS = 8
 FASTEST_HZ = 2500.0
 """Faster recordings are averaged down: mechanics above a kilohertz is not in the catalogue."""
+OVERSAMPLED = 12.0
+"""Rate over bandwidth, at the most."""
 BLOCKS = 12
 UNSEEN = (4, 9)
 """Blocks that neither fitting nor selection sees."""
@@ -92,7 +96,18 @@ def prepare(stage: Stage, recordings: Sequence[Recording], cut: float | None = N
     if factor > 1:
         strips = [_averaged(s, factor) for s in strips]
         rate /= factor
-    return Motion(strips, rate, cut or _bandwidth(stage, strips, rate))
+    cut = cut or _bandwidth(stage, strips, rate)
+    if _coarse(stage, strips):
+        # Every false reversal is a branch of the hysteresis: a coarse encoder is smoothed before it.
+        strips = [
+            replace(s, position=zero_phase(s.position, min(2.0 * cut, 0.4 * rate), rate)) for s in strips
+        ]
+    # Rows far finer than the bandwidth cost time and tell nothing: friction is exact over a displacement.
+    factor = int(rate / (OVERSAMPLED * cut))
+    if factor > 1:
+        strips = [_averaged(s, factor) for s in strips]
+        rate /= factor
+    return Motion(strips, rate, cut)
 
 
 def _windows(recording: Recording, most: int, rate: float) -> list[Strip]:
@@ -129,6 +144,15 @@ def _averaged(strip: Strip, factor: int) -> Strip:
     )
 
 
+def _coarse(stage: Stage, strips: Sequence[Strip]) -> bool:
+    """Tell whether position noise is no small part of the shortest travel at which friction yields."""
+    friction = stage.friction
+    if not isinstance(friction, MaxwellSlip):
+        return False
+    noise = max(float(np.hypot(stage.sensor.noise, stage.sensor.resolution / np.sqrt(12.0))), heard(strips))
+    return noise > 0.05 * min(r for _, r in friction.elements)
+
+
 def heard(strips: Sequence[Strip]) -> float:
     """Return the noise of position (m rms) that the recording itself shows, in the fastest third of its band.
 
@@ -147,7 +171,11 @@ def _bandwidth(stage: Stage, strips: Sequence[Strip], rate: float) -> float:
     if noise == 0.0 or force == 0.0:
         return most
     # rms of m a up to B under white position noise at this rate: m (2 pi B)^2 noise sqrt(B / (2.5 rate))
-    cuts = np.geomspace(min(10.0, most), most, 60)
+    cuts = np.geomspace(min(2.0, most), most, 80)
     disturbed = stage.mass * (2 * np.pi * cuts) ** 2 * noise * np.sqrt(cuts / (2.5 * rate))
-    quiet = cuts[disturbed < 0.004 * force]
+    friction = stage.friction
+    stiffness = friction.stiffness() if friction is not None else 0.0
+    # Presliding turns position noise into force as a spring would; it only has to stay a small part of it.
+    sprung = stiffness * noise * np.sqrt(2.0 * cuts / rate)
+    quiet = cuts[(disturbed < 0.004 * force) & (sprung < 0.03 * force)]
     return float(quiet[-1]) if quiet.size else float(cuts[0])
