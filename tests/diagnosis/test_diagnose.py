@@ -1,0 +1,100 @@
+"""The engine on recordings made here: what was hidden is named, and nothing where nothing was hidden."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rtcomp.diagnosis.diagnose import diagnose
+from rtcomp.diagnosis.result import Diagnosis
+from rtcomp.jobs.configuration import Configuration
+from rtcomp.jobs.demo import shipped
+from rtcomp.jobs.simulate import closed_loop
+from rtcomp.recording.reader import Recording, read
+from rtcomp.stage.stage import Stage
+
+REFERENCE = {
+    "kind": "multisine", "frequencies": [0.23, 0.71, 1.9, 4.3], "amplitudes": [2.5e-4, 1.2e-4, 6e-5, 1.5e-5],
+    "duration": 24.0,
+}  # fmt: skip
+
+
+def recorded(hidden: dict[str, Any] | None, **mechanics: Any) -> tuple[Stage, Recording]:
+    config = Configuration.load(shipped("leuven.yaml"))
+    changes: dict[str, Any] = dict(mechanics)
+    if hidden is not None:
+        changes["effects"] = [hidden]
+    plant = config.stage.with_changes(stage=changes) if changes else config.stage
+    run = closed_loop(config.changed(**plant.to_dict(), reference=REFERENCE))
+    columns = {k: run.columns[k] for k in ("time", "reference", "position", "voltage")}
+    return config.stage, Recording(columns, run.rate_hz)
+
+
+def diagnosed(hidden: dict[str, Any] | None, **mechanics: Any) -> Diagnosis:
+    stage, recording = recorded(hidden, **mechanics)
+    return diagnose(stage, [recording])
+
+
+def test_nothing_is_named_where_nothing_is_missing() -> None:
+    done = diagnosed(None)
+    assert done.verdict == "consistent"
+    assert not done.effects
+
+
+@pytest.mark.slow
+def test_other_values_of_what_is_believed_are_retuned_not_named() -> None:
+    done = diagnosed(None, mass=2.15, viscous=8.6)
+    assert done.verdict in ("retuned", "consistent")
+    assert not done.effects
+    assert done.fit.after <= done.fit.before
+
+
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        {"name": "cogging", "amplitude": 0.5, "period": 1.3e-4, "phase": 0.4},
+        pytest.param({"name": "drive-deadband", "width": 0.2}, marks=pytest.mark.slow),
+        pytest.param({"name": "asymmetric-friction", "asymmetry": 0.12}, marks=pytest.mark.slow),
+        pytest.param({"name": "parallel-spring", "stiffness": 4000.0}, marks=pytest.mark.slow),
+        pytest.param(
+            {"name": "position-dependent-friction", "amplitude": 0.25, "period": 2.5e-4, "phase": 1.0},
+            marks=pytest.mark.slow,
+        ),
+        pytest.param({"name": "drive-offset", "offset": 0.2}, marks=pytest.mark.slow),
+    ],
+    ids=lambda h: h["name"],
+)
+def test_what_was_hidden_is_named_and_the_extended_stage_has_it(hidden: dict[str, Any]) -> None:
+    done = diagnosed(hidden)
+    assert done.verdict == "missing-physics"
+    assert hidden["name"] in done.effects[0].names
+    assert done.fit.after < 0.3 * done.fit.before
+    assert any(e["name"] == done.effects[0].names[0] for e in done.stage.mechanics.effects)
+    assert done.where, "the place of so large a mismatch shows"
+    for name, value in done.effects[0].parameters.items():
+        assert value.low <= value.value <= value.high, name
+
+
+@pytest.mark.slow
+def test_cogging_is_found_with_its_size_and_period() -> None:
+    done = diagnosed({"name": "cogging", "amplitude": 0.5, "period": 1.3e-4, "phase": 0.4})
+    found = done.effects[0].parameters
+    assert found["amplitude"].value == pytest.approx(0.5, rel=0.03)
+    assert found["period"].value == pytest.approx(1.3e-4, rel=0.01)
+    assert np.cos(found["phase"].value - 0.4) > 0.99
+
+
+@pytest.mark.slow
+def test_emps_ends_below_its_authors_refit() -> None:
+    folder = Path(os.environ.get("RTCOMP_SHARED", Path(__file__).parents[3] / "shared/data"))
+    path = folder / "real/emps/DATA_EMPS.mat"
+    if not path.is_file():
+        pytest.skip(f"needs the EMPS benchmark's recording at {path}")
+    columns = {"time": "t", "reference": "qg", "position": "qm", "voltage": "vir"}
+    done = diagnose(Stage.load(shipped("emps_belief.yaml")), [read(path, columns)])
+    assert "asymmetric-viscous-friction" in {n for e in done.effects for n in e.names}
+    assert done.fit.after < 0.0311
