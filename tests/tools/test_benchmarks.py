@@ -99,6 +99,12 @@ def test_speed(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_diagnosis_without_recordings_to_judge(tmp_path: Path) -> None:
+    found = figures(tmp_path, "bench_diagnosis.py", "--seconds", 15)
+    assert "cogging" in found["15 s at 1 kHz: seconds"]["note"]
+
+
+@pytest.mark.slow
 def test_a_killed_run_keeps_its_file(tmp_path: Path) -> None:
     found = figures(tmp_path, "bench_kill.py", "--kills", 1)
     for who in ("loop", "loop and recorder"):
