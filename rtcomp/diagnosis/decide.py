@@ -28,6 +28,8 @@ SHORTLIST = 7
 QUICK, CONTENDERS = 2, 3
 """Steps of refinement for the whole short list, and how many of it are refined to the end."""
 LEAST_SHARE = 0.04
+SETTLED = 0.01
+"""Part of the first excess over the floor, below which what is left is how the kernels model, not physics."""
 BESIDE = 0.15
 """Part of what the entries before it explain, from which on a further entry counts beside them."""
 ENOUGH, ENOUGH_SHAPELESS = 0.8, 0.6
@@ -94,6 +96,8 @@ def decide(
     decision = Decision(refined, choices, base)
     for step in range(MOST):
         if current.errors.sum() < ABOVE_FLOOR * floor.sum():
+            break
+        if entries and current.errors.sum() - floor.sum() < SETTLED * (base.errors.sum() - floor.sum()):
             break
         best, rest, looked, gains = _best_addition(stage, motion, current, entries, progress, step)
         if step == 0:

@@ -13,9 +13,9 @@ from rtcomp.recording.reader import Recording
 from rtcomp.stage.balance import zero_phase
 from rtcomp.stage.stage import Stage
 
-MOST_ROWS = 80_000
+MOST_ROWS = 30_000
 """Rows that a diagnosis works on; of longer recordings it takes windows, evenly spread."""
-WINDOWS = 8
+WINDOWS = 3
 FASTEST_HZ = 2500.0
 """Faster recordings are averaged down: mechanics above a kilohertz is not in the catalogue."""
 OVERSAMPLED = 12.0
