@@ -58,6 +58,7 @@ def test_limits_keep_the_motion_as_it_is(leuven):
     assert d.searching(slow) is slow
 
 
+@pytest.mark.slow  # the example of `rtcomp demo` closes it among the quick ones
 def test_the_circle_closes(leuven, model):
     """Over one tick of delay, which is no physics that is missing."""
     config = d.searching(leuven.changed(device={"driver": "simulated", "delay_ticks": 1}))

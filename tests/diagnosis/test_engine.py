@@ -34,9 +34,17 @@ def recorded(hidden: dict[str, Any] | None, **mechanics: Any) -> tuple[Stage, Re
     return config.stage, Recording(columns, run.rate_hz)
 
 
+COGGING = {"name": "cogging", "amplitude": 0.5, "period": 1.3e-4, "phase": 0.4}
+
+
 def diagnosed(hidden: dict[str, Any] | None, **mechanics: Any) -> Diagnosis:
     stage, recording = recorded(hidden, **mechanics)
     return diagnose(stage, [recording])
+
+
+@pytest.fixture(scope="module")
+def cogging() -> Diagnosis:
+    return diagnosed(COGGING)
 
 
 def test_nothing_is_named_where_nothing_is_missing() -> None:
@@ -53,23 +61,7 @@ def test_other_values_of_what_is_believed_are_retuned_not_named() -> None:
     assert done.fit.after <= done.fit.before
 
 
-@pytest.mark.parametrize(
-    "hidden",
-    [
-        {"name": "cogging", "amplitude": 0.5, "period": 1.3e-4, "phase": 0.4},
-        pytest.param({"name": "drive-deadband", "width": 0.2}, marks=pytest.mark.slow),
-        pytest.param({"name": "asymmetric-friction", "asymmetry": 0.12}, marks=pytest.mark.slow),
-        pytest.param({"name": "parallel-spring", "stiffness": 4000.0}, marks=pytest.mark.slow),
-        pytest.param(
-            {"name": "position-dependent-friction", "amplitude": 0.25, "period": 2.5e-4, "phase": 1.0},
-            marks=pytest.mark.slow,
-        ),
-        pytest.param({"name": "drive-offset", "offset": 0.2}, marks=pytest.mark.slow),
-    ],
-    ids=lambda h: h["name"],
-)
-def test_what_was_hidden_is_named_and_the_extended_stage_has_it(hidden: dict[str, Any]) -> None:
-    done = diagnosed(hidden)
+def check_named(done: Diagnosis, hidden: dict[str, Any]) -> None:
     assert done.verdict == "missing-physics"
     assert hidden["name"] in done.effects[0].names
     assert done.fit.after < 0.3 * done.fit.before
@@ -79,10 +71,28 @@ def test_what_was_hidden_is_named_and_the_extended_stage_has_it(hidden: dict[str
         assert value.low <= value.value <= value.high, name
 
 
+def test_cogging_is_named_and_the_extended_stage_has_it(cogging: Diagnosis) -> None:
+    check_named(cogging, COGGING)
+
+
 @pytest.mark.slow
-def test_cogging_is_found_with_its_size_and_period() -> None:
-    done = diagnosed({"name": "cogging", "amplitude": 0.5, "period": 1.3e-4, "phase": 0.4})
-    found = done.effects[0].parameters
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        {"name": "drive-deadband", "width": 0.2},
+        {"name": "asymmetric-friction", "asymmetry": 0.12},
+        {"name": "parallel-spring", "stiffness": 4000.0},
+        {"name": "position-dependent-friction", "amplitude": 0.25, "period": 2.5e-4, "phase": 1.0},
+        {"name": "drive-offset", "offset": 0.2},
+    ],
+    ids=lambda h: h["name"],
+)
+def test_what_was_hidden_is_named_and_the_extended_stage_has_it(hidden: dict[str, Any]) -> None:
+    check_named(diagnosed(hidden), hidden)
+
+
+def test_cogging_is_found_with_its_size_and_period(cogging: Diagnosis) -> None:
+    found = cogging.effects[0].parameters
     assert found["amplitude"].value == pytest.approx(0.5, rel=0.03)
     assert found["period"].value == pytest.approx(1.3e-4, rel=0.01)
     assert np.cos(found["phase"].value - 0.4) > 0.99
