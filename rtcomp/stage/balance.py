@@ -35,6 +35,7 @@ from rtcomp.physics.wires import (
     VELOCITY,
     VOLTS,
 )  # fmt: skip
+from rtcomp.stage import lowpass
 from rtcomp.stage.inverse import undone
 from rtcomp.stage.stage import Stage
 
@@ -194,7 +195,7 @@ def true_position(stage: Stage, time: Floats, reading: Floats) -> Floats:
 
 
 def around_rows(force: Floats) -> Floats:
-    """Return the mean of a smooth force (N, (K,)) around each row, as second differences of position see it.
+    """Return the mean of a smooth force (N, (K,) or (K, p)) around each row, as second differences see it.
 
     The second difference weighs accelerations by a triangle from the row before to the row after; so weighed,
     a force that is smooth between rows is (F[k-1] + 10 F[k] + F[k+1]) / 12 (Numerov 1924), right to the
@@ -207,6 +208,4 @@ def around_rows(force: Floats) -> Floats:
 
 def zero_phase(signal: Floats, cutoff_hz: float, rate_hz: float) -> Floats:
     """Low-pass `signal` (K,) without delay: a second-order Butterworth forward and backward."""
-    from scipy.signal import butter, sosfiltfilt
-
-    return np.asarray(sosfiltfilt(butter(2, cutoff_hz, fs=rate_hz, output="sos"), signal), dtype=np.float64)
+    return lowpass.zero_phase(signal, cutoff_hz, rate_hz)
