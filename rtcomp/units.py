@@ -5,6 +5,8 @@ On a rotary axis read rad for m, N m for N and kg m^2 for kg.
 
 from __future__ import annotations
 
+import math
+
 COLUMN_UNITS: dict[str, str] = {
     "time": "s",
     "reference": "m",
@@ -44,3 +46,18 @@ _ROTARY = {
 def for_axis(unit: str, axis: str) -> str:
     """Return `unit` as it reads on `axis` (``"linear"`` or ``"rotary"``)."""
     return _ROTARY.get(unit, unit) if axis == "rotary" else unit
+
+
+_PREFIXES = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M"}
+
+
+def prefixed(unit: str, *values: float) -> tuple[list[str], str]:
+    """Return `values` (SI) with three digits in one unit that suits the largest: ``(["-236", "241"], "um")``.
+
+    Of a unit with kilograms or without a name (``"1"``) the numbers come as they are.
+    """
+    largest = max(abs(v) for v in values)
+    takes_one = unit not in ("", "1") and not unit.startswith("kg") and 0.0 < largest < 1e9
+    power = 3 * min(max(math.floor(math.log10(largest) / 3 + 1e-9), -3), 2) if takes_one else 0
+    texts = [f"{v / 10.0**power:.3g}" for v in values]
+    return texts, _PREFIXES[power] + unit if unit != "1" else ""

@@ -6,18 +6,26 @@ the number of axes looked at by counting the best of all of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rtcomp.diagnosis.along_position import Wave, wave
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.result import Place
 from rtcomp.kernels import Floats
+from rtcomp.units import for_axis, prefixed
 
 BINS = 24
 SHIFTS = 199
+ROWS = 8_000
+"""Rows that are looked at, of more evenly spread ones: places need no more."""
+PIECES = 4 * BINS
+"""Pieces that are put in another order where the axis is time itself."""
 LEAST_SHARE = 0.05
 """Part of the mismatch below which an axis is not mentioned."""
+AS_MUCH = 0.8
+"""Part of what depends on position at all, from which on a period in it is said instead."""
 
 
 @dataclass(frozen=True)
@@ -29,10 +37,53 @@ class Axis:
     values: Floats
     odd: Floats | None = None
     """Sign of the direction of motion, where the dependence is looked for that changes sign with it."""
+    force: str = "N"
+    """Unit of the residual."""
 
 
-def axes_of(motion: Motion) -> list[Axis]:
+@dataclass(frozen=True)
+class Binned:
+    """An axis cut into bins: edges (B + 1,), the bin of every row, and rows in every bin (B,)."""
+
+    axis: Axis
+    edges: Floats
+    at: np.ndarray
+    count: Floats
+
+    @classmethod
+    def of(cls, axis: Axis) -> Binned:
+        """Cut an axis into bins of equally many rows, direction into its two."""
+        if axis.name == "direction":
+            edges = np.array([-1.5, -0.5, 0.5, 1.5])
+        else:
+            edges = np.unique(np.quantile(axis.values, np.linspace(0, 1, BINS + 1)))
+        if edges.size < 2:
+            edges = np.array([edges[0] - 0.5, edges[0] + 0.5])
+        at = np.clip(np.searchsorted(edges, axis.values, side="right") - 1, 0, edges.size - 2)
+        return cls(axis, edges, at, np.bincount(at, minlength=edges.size - 1).astype(np.float64))
+
+    def means(self, residual: Floats) -> Floats:
+        """Return the mean of the residual (N, every row) in every bin."""
+        signed = residual if self.axis.odd is None else residual * self.axis.odd
+        total = np.bincount(self.at, weights=signed, minlength=self.count.size)
+        return np.asarray(total / np.maximum(self.count, 1.0))
+
+    def spread(self, residual: Floats) -> Floats:
+        """Return the standard error of those means, twenty rows reckoned as one."""
+        signed = residual if self.axis.odd is None else residual * self.axis.odd
+        squares = np.bincount(self.at, weights=signed**2, minlength=self.count.size)
+        variance = squares / np.maximum(self.count, 1.0) - self.means(residual) ** 2
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0) / np.maximum(self.count / 20.0, 1.0)))
+
+    def share(self, residual: Floats) -> float:
+        """Return the part of the residual (squared) that its means in the bins are."""
+        explained = float(np.sum(self.count * self.means(residual) ** 2))
+        return explained / max(float(residual @ residual), 1e-300)
+
+
+def axes_of(motion: Motion, axis: str = "linear") -> list[Axis]:
     """Return position, speed, direction, command, acceleration, time, time and distance since reversal."""
+    unit = for_axis("m", axis)
     speed, push, since, way = [], [], [], []
     for s in motion.strips:
         v, a = np.zeros_like(s.position), np.zeros_like(s.position)
@@ -49,95 +100,133 @@ def axes_of(motion: Motion) -> list[Axis]:
     x = motion.plain([s.position for s in motion.strips])
     direction = np.sign(v)
     return [
-        Axis("position", "m", x),
-        Axis("position", "m", x, direction),
-        Axis("speed", "m/s", v),
-        Axis("direction", "1", direction),
+        Axis("position", unit, x),
+        Axis("position", unit, x, direction),
+        Axis("speed", f"{unit}/s", v),
+        Axis("direction", "1", direction, force=for_axis("N", axis)),
         Axis("command", "V", motion.smooth([s.voltage for s in motion.strips])),
-        Axis("acceleration", "m/s^2", a),
+        Axis("acceleration", f"{unit}/s^2", a),
         Axis("time", "s", motion.plain([s.time for s in motion.strips])),
         Axis("time since reversal", "s", motion.plain(since)),
-        Axis("distance since reversal", "m", motion.plain(way), direction),
-        Axis("distance since reversal", "m", motion.plain(way)),
+        Axis("distance since reversal", unit, motion.plain(way), direction),
+        Axis("distance since reversal", unit, motion.plain(way)),
     ]
 
 
 def _since_reversal(moving: Floats, position: Floats, period: float) -> tuple[Floats, Floats]:
     """Return time (s) and distance (m) since the direction of motion last changed, for every row."""
-    last, at = 0.0, 0
-    starts = np.empty(moving.size, dtype=np.int64)
-    for k in range(moving.size):
-        if moving[k] != 0.0 and moving[k] != last:
-            last, at = moving[k], k
-        starts[k] = at
     rows = np.arange(moving.size)
-    way: Floats = np.abs(position - position[starts])
-    return np.asarray((rows - starts) * period, dtype=np.float64), way
+    way = np.flatnonzero(moving)
+    turns = way[np.flatnonzero(np.diff(moving[way], prepend=0.0))]
+    starts = np.zeros(moving.size, dtype=np.int64)
+    starts[turns] = turns
+    starts = np.maximum.accumulate(starts)
+    time = np.asarray((rows - starts) * period, dtype=np.float64)
+    return time, np.asarray(np.abs(position - position[starts]))
 
 
-def locate(motion: Motion, before: Floats, after: Floats | None, seed: int = 0) -> list[Place]:
-    """Return where the residual `before` (N, kept rows) shows, largest share first; `after` to compare."""
+def locate(
+    motion: Motion, before: Floats, after: Floats | None, seed: int = 0, axis: str = "linear"
+) -> list[Place]:
+    """Return where the residual `before` (N, kept rows) shows, largest share first; `after` to compare.
+
+    `axis` is ``linear`` or ``rotary``, for the units.
+    """
+    step = -(-before.size // ROWS)
+    every = slice(None, None, step)
+    looked = [Binned.of(_thinned(a, every)) for a in axes_of(motion, axis)]
+    few = before[every]
+    later = None if after is None else after[every]
     random = np.random.default_rng(seed)
-    shifts = random.integers(before.size // 20, before.size - before.size // 20, SHIFTS)
-    looked = axes_of(motion)
-    edges = [_edges(axis) for axis in looked]
-    shares = np.array([_share(a, e, before) for a, e in zip(looked, edges, strict=True)])
-    null = np.array(
-        [[_share(a, e, np.roll(before, k)) for a, e in zip(looked, edges, strict=True)] for k in shifts]
-    )
+    shifts = random.integers(few.size // 20, few.size - few.size // 20, SHIFTS)
+    shares = np.array([b.share(few) for b in looked])
+    null = np.array([[b.share(rolled) for b in looked] for rolled in (np.roll(few, k) for k in shifts)])
+    for i, b in enumerate(looked):
+        if b.axis.name == "time":
+            null[:, i] = [b.share(_shuffled(few, random)) for _ in shifts]
     # Axes differ in how much chance alone explains; the excess over that is compared between them.
     excess = (shares - null.mean(axis=0)) / (null.std(axis=0) + 1e-12)
     best = ((null - null.mean(axis=0)) / (null.std(axis=0) + 1e-12)).max(axis=1)
     found = []
-    for axis, edge, share, z in zip(looked, edges, shares, excess, strict=True):
+    for binned, share, z in zip(looked, shares, excess, strict=True):
         p = (1.0 + float(np.count_nonzero(best >= z))) / (SHIFTS + 1.0)
         if share > LEAST_SHARE and p <= 0.05:
-            found.append(_place(axis, edge, share, p, before, after))
+            found.append(_place(binned, share, p, few, later))
+    found = _with_period(found, looked[1].axis, looked[2].axis.values, few, later, shifts)
     line = _line(motion, before, after)
-    if line is not None:
+    # What depends on the motion has the motion's own tones; a tone of its own depends on nothing else.
+    if line is not None and line.share > max((p.share for p in found if p.axis != "time"), default=0.0):
         found.append(line)
-    return sorted(found, key=lambda place: -place.share)
+    # Whatever has a sign sees the direction too: where that is all, direction comes first.
+    return sorted(found, key=lambda place: -place.share - (0.03 if place.axis == "direction" else 0.0))
 
 
-def _edges(axis: Axis) -> Floats:
-    if axis.name == "direction":
-        return np.array([-1.5, -0.5, 0.5, 1.5])
-    edges = np.quantile(axis.values, np.linspace(0, 1, BINS + 1))
-    return np.asarray(np.unique(edges))
+def _shuffled(residual: Floats, random: np.random.Generator) -> Floats:
+    """Return the residual's pieces in another order: shifted in a circle, what drifts would drift still."""
+    pieces = np.array_split(residual, PIECES)
+    return np.concatenate([pieces[k] for k in random.permutation(PIECES)])
 
 
-def _means(axis: Axis, edges: Floats, residual: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return mean, count and standard error of the residual in every bin."""
-    signed = residual if axis.odd is None else residual * axis.odd
-    at = np.clip(np.searchsorted(edges, axis.values, side="right") - 1, 0, edges.size - 2)
-    count = np.bincount(at, minlength=edges.size - 1).astype(np.float64)
-    total = np.bincount(at, weights=signed, minlength=edges.size - 1)
-    squares = np.bincount(at, weights=signed**2, minlength=edges.size - 1)
-    mean = total / np.maximum(count, 1.0)
-    spread = np.sqrt(
-        np.maximum(squares / np.maximum(count, 1.0) - mean**2, 0.0) / np.maximum(count / 20.0, 1.0)
-    )
-    return mean, count, spread
+def _thinned(axis: Axis, every: slice) -> Axis:
+    return replace(axis, values=axis.values[every], odd=None if axis.odd is None else axis.odd[every])
 
 
-def _share(axis: Axis, edges: Floats, residual: Floats) -> float:
-    mean, count, _ = _means(axis, edges, residual)
-    return float(np.sum(count * mean**2) / max(float(residual @ residual), 1e-300))
+def _with_period(
+    found: list[Place],
+    position: Axis,
+    speed: Floats,
+    before: Floats,
+    after: Floats | None,
+    shifts: np.ndarray,
+) -> list[Place]:
+    """Say the period where what depends on position, or more than that, is one."""
+    x, direction = position.values, position.odd
+    assert direction is not None
+    at = wave(x, direction, speed, before, shifts)
+    if at is None or at.share < LEAST_SHARE or at.p_value > 0.05:
+        return found
+    plain = max((p.share for p in found if p.axis == "position"), default=0.0)
+    if at.share < AS_MUCH * plain:
+        return found
+    kept = [p for p in found if p.axis != "position"]
+    return [*kept, _periodic(at, position, before, after)]
 
 
-def _place(axis: Axis, edges: Floats, share: float, p: float, before: Floats, after: Floats | None) -> Place:
-    mean, count, spread = _means(axis, edges, before)
-    kept = count > 0
+def _periodic(at: Wave, position: Axis, before: Floats, after: Floats | None) -> Place:
+    """Draw a wave along the stroke, eight periods of it at the most, those where most rows are."""
+    x, direction = position.values, position.odd
+    assert direction is not None
+    low, high = float(x.min()), float(x.max())
+    middle = float(np.median(x))
+    begin = max(low, min(middle - 4 * at.period, high - 8 * at.period))
+    end = min(high, begin + 8 * at.period)
+    edges = np.linspace(begin, end, max(BINS, int(16 * (end - begin) / at.period)) + 1)
+    inside = (x >= begin) & (x <= end)
+    axis = Axis("position", position.unit, x[inside], direction[inside] if at.odd else None)
+    bins = np.clip(np.searchsorted(edges, axis.values, side="right") - 1, 0, edges.size - 2)
+    shown = Binned(axis, edges, bins, np.bincount(bins, minlength=edges.size - 1).astype(np.float64))
+    kept = shown.count > 0
+    residual = before[inside]
+    return Place(
+        "position", position.unit, (low, high), at.share, at.p_value, at.says(position.unit),
+        (0.5 * (edges[1:] + edges[:-1]))[kept], shown.means(residual)[kept],
+        None if after is None else shown.means(after[inside])[kept], shown.spread(residual)[kept],
+    )  # fmt: skip
+
+
+def _place(binned: Binned, share: float, p: float, before: Floats, after: Floats | None) -> Place:
+    axis, edges = binned.axis, binned.edges
+    mean, kept = binned.means(before), binned.count > 0
     centres = 0.5 * (edges[1:] + edges[:-1])
     if axis.name == "direction":
         centres = np.array([-1.0, 0.0, 1.0])
         kept &= centres != 0.0
     strong = np.flatnonzero(kept & (np.abs(mean) > 0.5 * np.abs(mean[kept]).max()))
     region = (float(edges[strong[0]]), float(edges[strong[-1] + 1]))
-    later = None if after is None else _means(axis, edges, after)[0][kept]
+    later = None if after is None else binned.means(after)[kept]
     return Place(
         axis.name, axis.unit, region, share, p, _says(axis, region, share, mean, strong),
-        centres[kept], mean[kept], later, spread[kept],
+        centres[kept], mean[kept], later, binned.spread(before)[kept],
     )  # fmt: skip
 
 
@@ -146,11 +235,12 @@ def _says(axis: Axis, region: tuple[float, float], share: float, mean: Floats, s
     if axis.odd is not None:
         part += ", with the sign of the motion"
     if axis.name == "direction":
-        return f"{part}: {mean[0]:+.3g} N backward, {mean[-1]:+.3g} N forward"
+        (back, forth), unit = prefixed(axis.force, mean[0], mean[-1])
+        return f"{part}: {back} {unit} backward, {forth} {unit} forward"
     if strong.size > 0.6 * mean.size:
         return f"{part}, all along"
-    where = f"between {region[0]:.3g} and {region[1]:.3g} {axis.unit}"
-    return f"{part}, most of it {where}"
+    (low, high), unit = prefixed(axis.unit, *region)
+    return f"{part}, most of it between {low} and {high} {unit}".rstrip()
 
 
 def _line(motion: Motion, before: Floats, after: Floats | None) -> Place | None:
