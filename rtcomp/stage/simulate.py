@@ -47,10 +47,10 @@ def impulse_scale(tangent: float, mass: float, h: float) -> float:
 
 
 @compiled
-def _integrate(
+def integrate(
     steps: np.ndarray, p: Floats, s: Floats, w: Floats, base: Floats, volts: float, seconds: float, count: int
 ) -> None:
-    """Advance by `count` steps of together `seconds`.
+    """Advance the wires `w` and states `s` by `count` steps of together `seconds`, `volts` held.
 
     base: mass (kg), force constant (N/V), largest stiffness (N/m), and the tangent stiffness of the last
     step (N/m), which is kept there.
@@ -141,7 +141,7 @@ class Simulator:
         """Integrate over `seconds` with the command `volts` (V) held."""
         count = max(1, math.ceil(seconds / self.step - 1e-9))
         m = self._moving
-        _integrate(m.steps, m.p, m.s, self._w, self._base, volts, seconds, count)
+        integrate(m.steps, m.p, m.s, self._w, self._base, volts, seconds, count)
 
     def measure(self) -> float:
         """Return the position (m) as the sensor sees it now; each call is a new measurement."""

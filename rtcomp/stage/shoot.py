@@ -1,0 +1,111 @@
+"""A stage let go from points of a recorded motion: short simulations, each from where the recording was.
+
+Up to its start the chain is led along the recorded motion, so that friction, delays and everything else that
+remembers has the memory of that motion; from there it runs free, driven by the recorded command. What it
+moves off by is an error of position that no controller hides, and that a missed break-away spoils for one
+window only (multiple shooting: Bock 1981; van Domselaar, Hemker 1975).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rtcomp.kernels import Floats, compiled
+from rtcomp.physics import Place, wires
+from rtcomp.physics.program import COUNT, Program, run_chain
+from rtcomp.physics.wires import (
+    ACCELERATION,
+    DRIVE,
+    FRICTION,
+    GAIN,
+    MASS,
+    MOVED,
+    POSITION,
+    PUSH,
+    REACH,
+    SCALE,
+    STEP,
+    TIME,
+    VELOCITY,
+    VOLTS,
+)  # fmt: skip
+from rtcomp.stage.simulate import integrate, largest_step, largest_stiffness
+from rtcomp.stage.stage import Stage
+
+
+def shoot(
+    stage: Stage,
+    time: Floats,
+    position: Floats,
+    velocity: Floats,
+    voltage: Floats,
+    starts: np.ndarray,
+    rows: int,
+) -> Floats:
+    """Return positions (m, (starts, rows)) simulated from each row of `starts` on, `rows` rows long.
+
+    The recorded motion is `time` (s, equally spaced), true `position` (m), `velocity` (m/s) and `voltage` (V,
+    held from row to row), each (K,). Every start must leave `rows` rows; the first position of each is the
+    recorded one. Sensors are left out.
+    """
+    starts = np.sort(np.asarray(starts, dtype=np.int64))
+    if rows < 1 or (starts.size and (starts[0] < 0 or starts[-1] + rows > time.size)):
+        raise ValueError(f"windows of {rows} rows from {starts} do not lie within {time.size} rows")
+    program = Program([e for e in stage.chain if e.place is not Place.SENSOR])
+    period = float((time[-1] - time[0]) / max(time.size - 1, 1))
+    count = max(1, math.ceil(period / largest_step(stage) - 1e-9))
+    base = np.array([stage.mass, stage.force_constant, largest_stiffness(stage), 0.0])
+    motion = np.ascontiguousarray(np.column_stack([time, position, velocity, voltage]))
+    out = np.empty((starts.size, rows))
+    w = np.zeros(wires.COUNT)
+    _shoot(program.steps, program.p, program.s, w, base, motion, starts, period, count, out)
+    return out
+
+
+@compiled
+def _shoot(
+    steps: np.ndarray,
+    p: Floats,
+    s: Floats,
+    w: Floats,
+    base: Floats,
+    motion: Floats,
+    starts: np.ndarray,
+    period: float,
+    count: int,
+    out: Floats,
+) -> None:
+    """Lead the chain along `motion` and let it go at `starts`; fill `out`."""
+    window = 0
+    for k in range(motion.shape[0]):
+        if window >= starts.size:
+            break
+        last = max(k - 1, 0)
+        w[TIME], w[STEP] = motion[k, 0], motion[k, 0] - motion[last, 0]
+        w[POSITION], w[VELOCITY] = motion[k, 1], motion[k, 2]
+        w[MOVED] = motion[k, 1] - motion[last, 1]
+        w[ACCELERATION] = (motion[k, 2] - motion[last, 2]) / period
+        w[VOLTS] = motion[last, 3]
+        _all(steps, p, s, w, base)
+        while window < starts.size and starts[window] == k:
+            free, wires_free, base_free = s.copy(), w.copy(), base.copy()
+            wires_free[STEP] = wires_free[MOVED] = 0.0
+            wires_free[VOLTS] = motion[k, 3]
+            _all(steps, p, free, wires_free, base)
+            force = wires_free[DRIVE] + wires_free[PUSH] - wires_free[FRICTION]
+            wires_free[ACCELERATION] = force / wires_free[MASS]
+            for i in range(out.shape[1]):
+                out[window, i] = wires_free[POSITION]
+                if i + 1 < out.shape[1]:
+                    integrate(steps, p, free, wires_free, base_free, motion[k + i, 3], period, count)
+            window += 1
+
+
+@compiled
+def _all(steps: np.ndarray, p: Floats, s: Floats, w: Floats, base: Floats) -> None:
+    w[MASS], w[GAIN] = base[0], base[1]
+    w[DRIVE] = w[PUSH] = w[FRICTION] = 0.0
+    w[REACH] = w[SCALE] = 1.0
+    run_chain(steps, p, s, w, 0, steps[COUNT])
