@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -13,6 +14,7 @@ from rtcomp.cli.output import prepare_output
 from rtcomp.cli.runs import to_json
 
 if TYPE_CHECKING:
+    from rtcomp.diagnosis.result import Place
     from rtcomp.report.terminal import Progress
 
 
@@ -70,7 +72,10 @@ def diagnose(
 
     with prepare_output(out, force) as work:
         with Steps(quiet=as_json) as steps:
-            found = run(stage, data, progress=lambda done, name: steps.update(name, done), seed=seed)
+            found = run(
+                stage, data, seed=seed, located=steps.located,
+                progress=lambda done, name: steps.update(name, done),
+            )  # fmt: skip
         found = replace(found, notes=list(dict.fromkeys([*notes, *found.notes])))
         text = to_json(found.to_json())
         write_text(work / "diagnosis.json", text + "\n")
@@ -91,7 +96,7 @@ def diagnose(
 
 
 class Steps:
-    """A line of progress for each step of the diagnosis, one after the other."""
+    """A line of progress for each step of the diagnosis, one after the other; the place when it is known."""
 
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
@@ -115,6 +120,14 @@ class Steps:
             self._name, self._line = name, Progress(f"{name:<8}", quiet=self._quiet)
             self._line.__enter__()
         self._line.update(done, figures or None)
+
+    def located(self, left: float, places: Sequence[Place]) -> None:
+        """Say where the mismatch shows, while its name is still looked for."""
+        from rtcomp.report.diagnosis_text import where_so_far
+        from rtcomp.report.terminal import say
+
+        self._close()
+        say(where_so_far(left, places), quiet=self._quiet)
 
     def _close(self) -> None:
         if self._line is not None:

@@ -14,7 +14,17 @@ from rtcomp.diagnosis.floor import floor_errors
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.motion import UNSEEN, Motion, prepare
 from rtcomp.diagnosis.refine import intervals
-from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
+from rtcomp.diagnosis.result import (
+    Candidate,
+    Diagnosis,
+    Experiment,
+    Fit,
+    Named,
+    Place,
+    Retuned,
+    Value,
+    Verdict,
+)
 from rtcomp.diagnosis.scene import Entry
 from rtcomp.errors import RtcompError
 from rtcomp.kernels import Floats
@@ -36,6 +46,8 @@ UNSEEABLE = ("sensor-scale",)
 """Entries that no recording of position and voltage shows: they scale everything."""
 
 Progress = Callable[[float, str], None]
+Located = Callable[[float, Sequence[Place]], None]
+"""Told, before anything is named, what part of the force the refitted stage leaves open (rms), and where."""
 
 
 def diagnose(
@@ -43,15 +55,22 @@ def diagnose(
     recordings: Sequence[Recording],
     *,
     progress: Progress | None = None,
+    located: Located | None = None,
     seed: int = 0,
 ) -> Diagnosis:
-    """Say where `stage` and `recordings` (of one rate) differ, what is missing, and what it explains."""
+    """Say where `stage` and `recordings` (of one rate) differ, what is missing, and what it explains.
+
+    `progress` hears how far each step is, `located` the places of the mismatch before anything is named.
+    """
     say: Progress = progress or (lambda _part, _what: None)
     say(0.0, "balance")
     motion = prepare(stage, recordings)
     base = fit_base(stage, motion)
     retuned_stage = extended_stage(stage, base, [])
     say(1.0, "balance")
+    if located is not None:
+        part = float(np.linalg.norm(base.residual) / max(float(np.linalg.norm(base.system.y)), 1e-300))
+        located(part, locate(motion, base.residual, None, seed, stage.axis))
     floor = floor_errors(retuned_stage, base, motion, seed + 1)
     power = float(base.system.blocks.power[base.ledger.seen].sum())
     least = np.maximum(floor, NEGLIGIBLE**2 / ABOVE_FLOOR * base.system.blocks.power[base.ledger.seen])
@@ -81,7 +100,7 @@ def diagnose(
         extended = stage
         fit = Fit(fit.before, fit.retuned, fit.before, fit.floor)
     say(0.4, "locate")
-    where = locate(motion, base.residual, final.residual if named else None, seed)
+    where = locate(motion, base.residual, final.residual if named else None, seed, stage.axis)
     effects = _effects(decision, named, base, final, least)
     retuned = _retuned(stage, final, extended)
     verdict = _verdict(effects, final, floor, least, fit)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 
-from rtcomp.diagnosis.result import Diagnosis, Named
+from rtcomp.diagnosis.result import Diagnosis, Named, Place
 from rtcomp.report.diagnosis_words import (
     UNEXPLAINED,
     joined,
@@ -25,7 +26,7 @@ _WIDTH, _LABEL = 100, 12
 def diagnosis_text(found: Diagnosis, out: str) -> str:
     """Return the summary of a diagnosis whose files are in the folder `out`, lines of 100 characters."""
     lines = [found.sentence(), ""]
-    lines += _block("Where", [f"{place.says} ({percent(place.share)})" for place in found.where])
+    lines += _block("Where", [place.says for place in found.where])
     lines += _block("Named", [line for effect in found.effects for line in _effect(effect)])
     lines += _block(
         "Retuned",
@@ -46,6 +47,15 @@ def diagnosis_text(found: Diagnosis, out: str) -> str:
         what = f"{si(e.seconds, 's')}, {e.reference.get('kind', 'a motion')}{how}"
         lines += _block("Next", [f"{what}, tell apart {joined(e.tells_apart, 'and')}", next_command(out)])
     return "\n".join(lines)
+
+
+def where_so_far(left: float, places: Sequence[Place]) -> str:
+    """Return where the mismatch shows, as it is known before anything is named.
+
+    `left` is the part of the force (rms) that the refitted stage leaves open.
+    """
+    lines = _block("Where", [place.says for place in places[:3]] or ["in no one place more than by chance"])
+    return "\n".join([f"Refitted, the stage leaves {si(100 * left, '%')} of the force open.", *lines])
 
 
 def _effect(effect: Named) -> list[str]:

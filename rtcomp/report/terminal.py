@@ -17,7 +17,7 @@ from rich.text import Text
 from rtcomp.report.page import Row
 from rtcomp.report.quantities import si, written
 
-__all__ = ["Progress", "Row", "print_summary", "si", "summary_table"]
+__all__ = ["Progress", "Row", "print_summary", "say", "si", "summary_table"]
 
 _PERIOD = 1.0 / 8.0
 
@@ -103,6 +103,13 @@ class Progress:
     def _draw(self) -> None:
         assert self._bar is not None
         self._bar.update(self._task, completed=self._done, figures=self._figures, refresh=True)
+
+
+def say(text: str, *, quiet: bool = False, console: Console | None = None) -> None:
+    """Print lines beside the progress: on standard error where it is a terminal, unless `quiet`."""
+    console = console or Console(stderr=True)
+    if not quiet and console.is_terminal:
+        console.print(Text(text), soft_wrap=True)
 
 
 def summary_table(title: str, rows: Sequence[Row | tuple[Any, ...]]) -> Table:

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 import yaml
-from command import refused, rtcomp, write
+from command import in_a_terminal, refused, rtcomp, write
 
 from rtcomp.stage.stage import Stage
 
@@ -143,3 +143,11 @@ def test_the_next_experiment_is_a_reference_that_runs(folder: Path, diagnosed: d
     run = rtcomp("simulate", "out/stage.yaml", "--reference", "out/reference.yaml", "--out", "next", "--json",
                  at=folder)  # fmt: skip
     assert run.returncode == 0, run.stderr
+
+
+def test_the_place_is_shown_on_the_terminal_before_anything_is_named(folder: Path) -> None:
+    shown = in_a_terminal(
+        "diagnose", "cogging.h5", "--stage", "stage.yaml", "--out", "shown", "--force", at=folder
+    )
+    place, rest = shown.index("Refitted, the stage leaves"), shown.index("screen")
+    assert place < shown.index("periodic in position: period 5") < rest < shown.index("Missing: cogging")
