@@ -83,8 +83,12 @@ def fit_base(
     known = [e for e in map(physics.build, stage.mechanics.effects) if e.place is not physics.Place.DRIVE]
     for scale in scales:
         ledger = Ledger(stage, motion, grid_of(stage, scale), known)
-        system = ledger.system(effects or [])
+        system = ledger.system()
         bounds = bounds_of(stage, system.columns.shape[1], released=released)
+        for _ in range(2 if effects else 1):
+            found = system.blocks.coefficients(ledger.seen, bounds)
+            ledger.weigh(found[FIXED : FIXED + ledger.reaches.size])
+            system = ledger.system(effects or [])
         errors = system.blocks.left_out(ledger.seen, bounds)
         if best is None or errors.sum() < best.errors.sum():
             best = Fitted(ledger, system, bounds, errors, scale)

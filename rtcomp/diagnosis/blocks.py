@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rtcomp.kernels import Floats
+from rtcomp.kernels import Floats, compiled
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,20 @@ class Blocks:
             cross.append(part.T @ target)
             power.append(target @ target)
         return cls(np.array(gram), np.array(cross), np.array(power), scale)
+
+    def extended(self, columns: Floats, more: Floats, y: Floats, block: np.ndarray) -> Blocks:
+        """Return the statistics with further columns `more` (n, q) beside those (n, p) that these are of."""
+        norms = np.linalg.norm(more, axis=0)
+        scale = np.where(norms > 0, norms, 1.0)
+        b = more / scale
+        edges = np.searchsorted(block, np.arange(self.power.size + 1))
+        grams, crosses = [], []
+        for k, (first, last) in enumerate(pairwise(edges)):
+            part = b[first:last]
+            mixed = (columns[first:last].T @ part) / self.scale[:, None]
+            grams.append(np.block([[self.gram[k], mixed], [mixed.T, part.T @ part]]))
+            crosses.append(np.concatenate([self.cross[k], part.T @ y[first:last]]))
+        return Blocks(np.array(grams), np.array(crosses), self.power, np.concatenate([self.scale, scale]))
 
     def solve(self, use: np.ndarray, bounds: Bounds | None = None) -> Floats:
         """Return the scaled coefficients (p,) fitted on the blocks where `use` (K,) is true."""
@@ -83,6 +97,7 @@ class Bounds:
         return Bounds(np.concatenate([self.low, -free]), np.concatenate([self.high, free]))
 
 
+@compiled
 def _bounded(gram: Floats, cross: Floats, low: Floats, high: Floats) -> Floats:
     """Minimise c' G c / 2 - h' c within bounds by an active set (Portugal, Judice, Vicente 1994).
 
@@ -90,27 +105,49 @@ def _bounded(gram: Floats, cross: Floats, low: Floats, high: Floats) -> Floats:
     """
     size = cross.size
     state = np.zeros(size, dtype=np.int8)  # 0 free, -1 at low, 1 at high
+    wrong = np.zeros(size, dtype=np.int8)
     best, rounds = size + 1, 5
-    tolerance = 1e-10 * float(np.abs(cross).max() + 1.0)
+    tolerance = 1e-10 * (np.abs(cross).max() + 1.0)
     c = np.zeros(size)
     for _ in range(20 * size):
-        free = state == 0
-        c = np.where(state < 0, low, np.where(state > 0, high, 0.0))
-        if free.any():
-            right = cross[free] - gram[np.ix_(free, ~free)] @ c[~free]
-            c[free] = np.linalg.solve(gram[np.ix_(free, free)], right)
+        free = np.flatnonzero(state == 0)
+        for i in range(size):
+            if state[i] != 0:
+                c[i] = low[i] if state[i] < 0 else high[i]
+        if free.size > 0:
+            part = np.empty((free.size, free.size))
+            right = np.empty(free.size)
+            for a in range(free.size):
+                i = free[a]
+                right[a] = cross[i]
+                for j in range(size):
+                    if state[j] != 0:
+                        right[a] -= gram[i, j] * c[j]
+                for b in range(free.size):
+                    part[a, b] = gram[i, free[b]]
+            c[free] = np.linalg.solve(part, right)
         slope = gram @ c - cross
-        too_low, too_high = free & (c < low), free & (c > high)
-        release = ((state < 0) & (slope < -tolerance)) | ((state > 0) & (slope > tolerance))
-        wrong = too_low | too_high | release
-        count = int(wrong.sum())
+        count = last = 0
+        for i in range(size):
+            wrong[i] = 0
+            if state[i] == 0 and c[i] < low[i]:
+                wrong[i] = -1
+            elif state[i] == 0 and c[i] > high[i]:
+                wrong[i] = 1
+            elif (state[i] < 0 and slope[i] < -tolerance) or (state[i] > 0 and slope[i] > tolerance):
+                wrong[i] = 2
+            if wrong[i] != 0:
+                count, last = count + 1, i
         if count == 0:
             return c
+        single = False
         if count < best:
             best, rounds = count, 5
         elif rounds > 0:
             rounds -= 1
         else:
-            wrong = np.arange(size) == np.flatnonzero(wrong)[-1]
-        state[wrong & too_low], state[wrong & too_high], state[wrong & release] = -1, 1, 0
-    return np.clip(c, low, high)
+            single = True
+        for i in range(size):
+            if wrong[i] != 0 and (i == last or not single):
+                state[i] = 0 if wrong[i] == 2 else wrong[i]
+    return np.minimum(np.maximum(c, low), high)

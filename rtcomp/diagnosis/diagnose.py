@@ -140,7 +140,7 @@ def _held_out(stage: Stage, motion: Motion) -> float:
     start = 0
     for strip in motion.strips:
         balance = force_balance(stage, strip.time, strip.position, strip.voltage, motion.cut)
-        rows = slice(motion.edge, -motion.edge or None, motion.thinning)
+        rows = motion.kept(strip)
         drive, needed = balance.force_drive[rows], balance.force_motion[rows]
         unseen = np.isin(block[start : start + drive.size], UNSEEN)
         start += drive.size
@@ -208,7 +208,8 @@ def _fold(
             value = plain.mechanics.viscous + float(entry["coefficient"])  # type: ignore[arg-type]
             changes["viscous"] = max(value, 0.0)
         elif name == "inertia":
-            changes["mass"] = float(entry["mass"])  # type: ignore[arg-type]
+            # The base's mass is refitted beside the entry, whose kernel replaces the believed one.
+            changes["mass"] = float(entry["mass"]) * plain.mass / stage.mass  # type: ignore[arg-type]
         else:
             named.append(entry)
             kept.append(choice)

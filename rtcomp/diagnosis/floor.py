@@ -13,7 +13,7 @@ import numpy as np
 
 from rtcomp.diagnosis.base import Fitted, bounds_of
 from rtcomp.diagnosis.ledger import Ledger
-from rtcomp.diagnosis.motion import Motion, Strip
+from rtcomp.diagnosis.motion import Motion, Strip, unstepped
 from rtcomp.errors import RtcompError
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.simulate import on_reference
@@ -83,5 +83,7 @@ def _twin(stage: Stage, motion: Motion, seed: int) -> Motion | None:
         off = float(np.sqrt(np.mean((position - strip.position) ** 2)))
         if run.outcome.ticks < strip.time.size or not off < 0.5 * np.ptp(strip.position):
             return None
-        strips.append(Strip(strip.time, position, run.columns["voltage"], strip.reference))
+        if motion.coarse:
+            position = unstepped(position, motion.cut, motion.rate)
+        strips.append(replace(strip, position=position, voltage=run.columns["voltage"]))
     return replace(motion, strips=strips)

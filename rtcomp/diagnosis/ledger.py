@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from rtcomp.diagnosis.bank import units_along
 from rtcomp.diagnosis.blocks import Blocks
 from rtcomp.diagnosis.motion import BLOCKS, UNSEEN, Motion, Strip
 from rtcomp.kernels import Floats, call_effect, compiled
@@ -23,7 +24,6 @@ from rtcomp.physics import Effect, Place
 from rtcomp.physics.coupled import LOAD_SHARE
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.physics.rows import new_rows
-from rtcomp.physics.speed import MicroDamping, ViscousFriction
 from rtcomp.physics.wires import SENSED, STEP, TIME
 from rtcomp.stage.balance import around_rows, forces
 from rtcomp.stage.stage import Stage
@@ -33,6 +33,14 @@ BIASES = ("constant-force", "gravity", "drive-offset")
 PARTS = 8
 GRID = 14
 """Reaches of the grid where the believed friction is not a short list of elements."""
+
+
+REMEMBERED = 24
+"""Tables of friction kept at a time: those of the entries that are refined together."""
+
+
+WHOLE = ("load-dependent-friction", "creep", "non-congruent-friction")
+"""Modifiers that ask for the whole of friction, so that its weights change what its units do."""
 
 
 @dataclass(frozen=True)
@@ -61,10 +69,14 @@ class Ledger:
         self.grain = 1.5 * sensor.noise + 0.5 * sensor.resolution
         self.seen = np.ones(BLOCKS, dtype=np.bool_)
         self.seen[list(UNSEEN)] = False
-        friction = self.stage.friction
-        bank = friction.elements if isinstance(friction, MaxwellSlip) else [(1.0, float(self.reaches.mean()))]
-        self._believed = np.array([k for k, _ in bank]), np.array([r for _, r in bank])
+        self.weights = believed_weights(self.stage, self.reaches)
         self._plain: System | None = None
+        self._paths: tuple[object, list[tuple[Floats, Floats, Floats]]] = (None, [])
+        self._frictions: dict[object, Floats] = {}
+
+    def weigh(self, weights: Floats) -> None:
+        """Take `weights` (N/m) of the stop elements for the friction at hand, where effects ask for it."""
+        self.weights = np.ascontiguousarray(weights)
 
     @property
     def biased(self) -> bool:
@@ -89,8 +101,9 @@ class Ledger:
 
     def extended(self, made: System, names: Sequence[str], more: Floats) -> System:
         """Return `made` with further columns `more` (n, q)."""
+        blocks = made.blocks.extended(made.columns, more, made.y, self.block)
         columns = np.column_stack([made.columns, more])
-        return System(made.y, columns, (*made.names, *names), Blocks.of(columns, made.y, self.block, BLOCKS))
+        return System(made.y, columns, (*made.names, *names), blocks)
 
     def added(self, effect: Effect, sensors: Sequence[Effect] = ()) -> Floats:
         """Return the force (N, kept rows) that the motion needs for `effect` alone: a column."""
@@ -106,39 +119,71 @@ class Ledger:
     def _make(self, effects: Sequence[Effect]) -> System:
         drive = [e for e in effects if e.place is Place.DRIVE]
         modifiers = [e for e in effects if e.place is Place.FRICTION]
+        sensors = [e for e in effects if e.place is Place.SENSOR]
         others = [e for e in effects if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
         gap = sum(float(e.values["gap"]) for e in effects if e.name == "backlash")
         others = [e for e in others if e.name != "backlash"]
-        speed = self.stage.mechanics.micro_damping_speed
-        sides, tables = [], []
         before: list[Effect] = []
         if any(e.name == "load-dependent-friction" for e in modifiers):
-            before = sorted([*self._drive(), *drive], key=lambda e: e.order)
-        for strip in self.motion.strips:
-            x, v, a = kinematics(strip, self.motion.period, effects)
-            given = self._given(strip, drive, x, v, a)
+            before = [*self._drive(), *drive]
+        paths = self._kinematics(sensors)
+        sides, masses = [], []
+        for strip, (x, v, a) in zip(self.motion.strips, paths, strict=True):
             f = forces(self.stage, [*modifiers, *others], strip.time, x, v, a, strip.voltage)
+            given = self._given(strip, drive, x, v, a)
             sides.append(given + around_rows(f.push - f.friction))
             moved = a * f.mass / self.stage.mass
             if gap > 0.0:
-                x = behind_play(x, gap, *self._believed)
-                v, rest = derivatives(x, self.motion.period)
+                rest = derivatives(self._behind(x, gap), self.motion.period)[1]
                 moved = moved + LOAD_SHARE * (rest - a)
-                a = rest
-            units: list[Effect] = [
-                ViscousFriction(coefficient=1.0),
-                MicroDamping(coefficient=1.0, speed=speed),
-            ]
-            units += [MaxwellSlip([(1.0, float(r))]) for r in self.reaches]
-            columns = [moved, *(self._unit(strip, before, modifiers, one, x, v, a) for one in units)]
-            tables.append(np.column_stack([columns[0], *map(around_rows, columns[1:])]))
+            masses.append(moved)
+        columns = [self.motion.smooth(masses), self._friction(before, modifiers, sensors, gap)]
         names = (MASS, VISCOUS, MICRO, *(f"reach {r:.3g}" for r in self.reaches))
+        y = self.motion.smooth(sides)
         if self.biased:
             # A believed bias is a number like the others: it is refitted with them.
             names = (*names, BIAS)
-            tables = [np.column_stack([t, -np.ones(t.shape[0])]) for t in tables]
-        y, table = self.motion.smooth(sides), self.motion.smooth(tables)
+            columns.append(-np.ones_like(y))
+        table = np.column_stack(columns)
         return System(y, table, names, Blocks.of(table, y, self.block, BLOCKS))
+
+    def _kinematics(self, sensors: Sequence[Effect]) -> list[tuple[Floats, Floats, Floats]]:
+        """Return true position, velocity and acceleration of each strip; remembers the last ones."""
+        key = _key(sensors)
+        if self._paths[0] != key:
+            found = [kinematics(strip, self.motion.period, sensors) for strip in self.motion.strips]
+            self._paths = key, found
+        return self._paths[1]
+
+    def _behind(self, x: Floats, gap: float) -> Floats:
+        # As believed: a play that is not yet in the balance is taken for longer reaches.
+        friction = self.stage.friction
+        if isinstance(friction, MaxwellSlip):
+            return behind_play(x, gap, *map(np.array, zip(*friction.elements, strict=True)))
+        return behind_play(x, gap, self.weights, self.reaches)
+
+    def _friction(
+        self, before: Sequence[Effect], modifiers: Sequence[Effect], sensors: Sequence[Effect], gap: float
+    ) -> Floats:
+        """Return the units of friction on the kept rows; remembered by what changes them."""
+        weighs = gap > 0.0 or any(e.name in WHOLE for e in modifiers)
+        key = (_key(before), _key(modifiers), _key(sensors), gap, weighs and self.weights.tobytes())
+        if key not in self._frictions:
+            rows = []
+            for strip, (x, v, a) in zip(self.motion.strips, self._kinematics(sensors), strict=True):
+                if gap > 0.0:
+                    x = self._behind(x, gap)
+                    v, a = derivatives(x, self.motion.period)
+                held = np.append(strip.voltage[:1], strip.voltage[:-1])
+                motion = np.column_stack([strip.time, x, v, a, held])
+                found = units_along(
+                    self.stage, before, modifiers, self.reaches, self.weights, motion, self.grain
+                )
+                rows.append(around_rows(found))
+            if len(self._frictions) >= REMEMBERED:
+                self._frictions.pop(next(iter(self._frictions)))
+            self._frictions[key] = self.motion.smooth(rows)
+        return self._frictions[key]
 
     def _given(self, strip: Strip, drive: Sequence[Effect], x: Floats, v: Floats, a: Floats) -> Floats:
         chain = sorted([*self._drive(), *drive], key=lambda e: e.order)
@@ -152,24 +197,22 @@ class Ledger:
         chain = [e for e in self.stage.chain if e.place is Place.DRIVE]
         return [e for e in chain if not any(e is k for k in self.known)]
 
-    def _unit(
-        self,
-        strip: Strip,
-        before: Sequence[Effect],
-        modifiers: Sequence[Effect],
-        one: Effect,
-        x: Floats,
-        v: Floats,
-        a: Floats,
-    ) -> Floats:
-        """Return the friction (N, every row) of one unit of the base with `modifiers` at work on it."""
-        chain = sorted([*modifiers, one], key=lambda e: e.order)
-        held = np.append(strip.voltage[:1], strip.voltage[:-1])
-        alone = forces(self.stage, [*before, *chain], strip.time, x, v, a, held, self.grain).friction
-        if not modifiers:
-            return alone
-        rest = [e for e in chain if e is not one]
-        return alone - forces(self.stage, [*before, *rest], strip.time, x, v, a, held, self.grain).friction
+
+def _key(effects: Sequence[Effect]) -> object:
+    return tuple(repr(e.to_dict()) for e in effects)
+
+
+def believed_weights(stage: Stage, reaches: Floats) -> Floats:
+    """Return the believed friction as stiffnesses (N/m) of stop elements of these reaches (m)."""
+    friction = stage.friction
+    weights = np.zeros(reaches.size)
+    if isinstance(friction, MaxwellSlip):
+        for k, r in friction.elements:
+            at = int(np.argmin(np.abs(np.log(reaches / r))))
+            weights[at] += k * r / reaches[at]
+    else:
+        weights[:] = 1.0 / reaches.size
+    return weights
 
 
 def kinematics(strip: Strip, period: float, effects: Sequence[Effect] = ()) -> tuple[Floats, Floats, Floats]:

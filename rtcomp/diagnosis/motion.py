@@ -8,18 +8,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rtcomp.kernels import Floats
+from rtcomp.physics import Effect
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.balance import zero_phase
 from rtcomp.stage.stage import Stage
 
-MOST_ROWS = 30_000
-"""Rows that a diagnosis works on; of longer recordings it takes windows, evenly spread."""
-WINDOWS = 3
-FASTEST_HZ = 2500.0
-"""Faster recordings are averaged down: mechanics above a kilohertz is not in the catalogue."""
-OVERSAMPLED = 12.0
-"""Rate over bandwidth, at the most."""
+MOST_ROWS = 120_000
+"""Rows that a diagnosis works on as they are; of longer recordings it takes windows, evenly spread."""
+WINDOW_ROWS = 12_000
+WINDOWS = 5
+SAMPLE = 6_000
+"""Rows of each window from which the bandwidth is judged."""
+OVERSAMPLED = 8.0
+"""Rate over bandwidth, at the most: friction is exact over a displacement, finer rows only cost time."""
+WASHED = 2.2
+"""Travel within a strip, in longest reaches, after which friction has forgotten what was before it."""
+LEAD = 0.2
+"""Part of a recording that may go by until then; else what was before it has to be taken as nothing."""
 BLOCKS = 12
 UNSEEN = (4, 9)
 """Blocks that neither fitting nor selection sees."""
@@ -27,12 +33,16 @@ UNSEEN = (4, 9)
 
 @dataclass(frozen=True)
 class Strip:
-    """One uninterrupted stretch of a recording at `rate`: time (s), position (m), voltage (V), reference."""
+    """One uninterrupted stretch of a recording at `rate`: time (s), position (m), voltage (V), reference.
+
+    Its first `lead` rows only tell friction where it comes from; they are not compared.
+    """
 
     time: Floats
     position: Floats
     voltage: Floats
     reference: Floats | None
+    lead: int = 0
 
 
 @dataclass(frozen=True)
@@ -42,6 +52,8 @@ class Motion:
     strips: Sequence[Strip]
     rate: float
     cut: float
+    coarse: bool = False
+    """Whether positions were smoothed, lest every count of the encoder be a reversal."""
 
     @property
     def period(self) -> float:
@@ -65,13 +77,14 @@ class Motion:
         """Length of all stretches together (s)."""
         return float(sum(s.time.size for s in self.strips)) / self.rate
 
-    def smooth(self, rows: Sequence[Floats]) -> Floats:
-        """Smooth an array a strip, (n_i,) or (n_i, p), below the cut, thin it, and join the strips."""
-        from scipy.signal import butter, sosfiltfilt
+    def kept(self, strip: Strip) -> slice:
+        """Return the rows of a strip that are compared: after its lead, where smoothing has neighbours."""
+        return slice(strip.lead + self.edge, -self.edge or None, self.thinning)
 
-        sections = butter(2, self.cut, fs=self.rate, output="sos")
-        edge, step = self.edge, self.thinning
-        return np.concatenate([sosfiltfilt(sections, r, axis=0)[edge : -edge or None : step] for r in rows])
+    def smooth(self, rows: Sequence[Floats]) -> Floats:
+        """Smooth an array a strip, (n_i,) or (n_i, p), below the cut; join what is compared of the strips."""
+        parts = zip(self.strips, rows, strict=True)
+        return np.concatenate([zero_phase(r, self.cut, self.rate)[self.kept(s)] for s, r in parts])
 
     @property
     def edge(self) -> int:
@@ -79,48 +92,70 @@ class Motion:
         return int(self.rate / self.cut) + 2
 
     def plain(self, rows: Sequence[Floats]) -> Floats:
-        """Thin and join without smoothing."""
-        return np.concatenate([r[self.edge : -self.edge or None : self.thinning] for r in rows])
+        """Keep what is compared of an array a strip, and join the strips, without smoothing."""
+        return np.concatenate([r[self.kept(s)] for s, r in zip(self.strips, rows, strict=True)])
 
     def block(self) -> np.ndarray:
         """Return the block number, 0 to BLOCKS - 1, of every kept row: equal stretches of motion."""
-        count = sum(len(s.time[self.edge : -self.edge or None : self.thinning]) for s in self.strips)
+        count = sum(len(s.time[self.kept(s)]) for s in self.strips)
         return np.arange(count) * BLOCKS // count
 
 
 def prepare(stage: Stage, recordings: Sequence[Recording], cut: float | None = None) -> Motion:
     """Bring recordings of one rate to a workable size: windows of long ones, averages of fast ones."""
     rate = recordings[0].rate_hz
-    strips = [s for r in recordings for s in _windows(r, MOST_ROWS // len(recordings), rate)]
-    factor = max(1, int(rate // FASTEST_HZ))
+    reach = longest_reach(stage.friction)
+    if cut is None:
+        cut = _bandwidth(stage, [s for r in recordings for s in _windows(r, SAMPLE, 0.0)], rate)
+    factor = max(1, int(rate / (OVERSAMPLED * cut)))
+    if sum(len(r) for r in recordings) <= factor * MOST_ROWS:
+        strips = [_whole(r, reach) for r in recordings]
+    else:
+        strips = [s for r in recordings for s in _windows(r, factor * WINDOW_ROWS // len(recordings), reach)]
+    coarse = _coarse(stage, strips)
+    if coarse:
+        strips = [replace(s, position=unstepped(s.position, cut, rate)) for s in strips]
     if factor > 1:
         strips = [_averaged(s, factor) for s in strips]
         rate /= factor
-    cut = cut or _bandwidth(stage, strips, rate)
-    if _coarse(stage, strips):
-        # Every false reversal is a branch of the hysteresis: a coarse encoder is smoothed before it.
-        strips = [
-            replace(s, position=zero_phase(s.position, min(2.0 * cut, 0.4 * rate), rate)) for s in strips
-        ]
-    # Rows far finer than the bandwidth cost time and tell nothing: friction is exact over a displacement.
-    factor = int(rate / (OVERSAMPLED * cut))
-    if factor > 1:
-        strips = [_averaged(s, factor) for s in strips]
-        rate /= factor
-    return Motion(strips, rate, cut)
+    return Motion(strips, rate, cut, coarse)
 
 
-def _windows(recording: Recording, most: int, rate: float) -> list[Strip]:
-    most *= max(1, int(rate // FASTEST_HZ))
+def longest_reach(friction: Effect | None) -> float:
+    """Return the travel (m) at which the last of the believed friction yields; 0 where that is not known."""
+    return max(r for _, r in friction.elements) if isinstance(friction, MaxwellSlip) else 0.0
+
+
+def unstepped(position: Floats, cut: float, rate: float) -> Floats:
+    """Smooth the counts of a coarse encoder (m, (K,)): every false reversal would be a branch of its own."""
+    return zero_phase(position, min(2.0 * cut, 0.4 * rate), rate)
+
+
+def _whole(recording: Recording, reach: float) -> Strip:
     good = recording.trusted
     position = np.interp(recording.time, recording.time[good], recording.position[good])
-    time = recording.time - recording.time[0]
-    whole = Strip(time, position, recording.voltage, recording.reference)
-    if time.size <= most:
+    strip = Strip(recording.time - recording.time[0], position, recording.voltage, recording.reference)
+    washed = np.maximum.accumulate(position) - np.minimum.accumulate(position) >= WASHED * reach
+    first = int(np.argmax(washed))
+    late = not washed[first] or first > LEAD * washed.size
+    return replace(strip, lead=0 if late else first)
+
+
+def _windows(recording: Recording, rows: int, reach: float) -> list[Strip]:
+    """Return windows of so many rows, each with the lead that wipes out what friction remembers."""
+    whole = _whole(recording, reach)
+    if whole.time.size <= WINDOWS * rows:
         return [whole]
-    length = most // WINDOWS
-    starts = np.linspace(0, time.size - length, WINDOWS).astype(int)
-    return [_part(whole, slice(s, s + length)) for s in starts]
+    found = []
+    for start in np.linspace(0, whole.time.size - rows, WINDOWS).astype(int):
+        first = max(start - rows, 0)
+        before = whole.position[first : start + 1][::-1]
+        washed = np.maximum.accumulate(before) - np.minimum.accumulate(before) >= WASHED * reach
+        lead = int(np.argmax(washed)) if washed.any() else start - first
+        lead = max(lead, whole.lead if start == 0 else 0)
+        first = max(start - lead, 0)
+        found.append(replace(_part(whole, slice(first, first + lead + rows)), lead=lead))
+    return found
 
 
 def _part(strip: Strip, rows: slice) -> Strip:
@@ -141,6 +176,7 @@ def _averaged(strip: Strip, factor: int) -> Strip:
         mean(strip.position),
         mean(strip.voltage),
         None if strip.reference is None else mean(strip.reference),
+        -(-strip.lead // factor),
     )
 
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from rtcomp.diagnosis.periodogram import periodogram
 from rtcomp.diagnosis.scene import Entry, Point, Scene
 
 
@@ -102,16 +103,11 @@ def _cyclic_periods(s: Scene, peaks: int = 2) -> list[float]:
     """Return periods (m) whose apparent acceleration stands out of the residual."""
     mass = s.fitted.ledger.stage.mass
     step = float(np.quantile(np.abs(np.diff(s.x)), 0.5)) or s.span / 1000
-    n = np.arange(3.0, min(400.0, s.span / (3 * step)), 0.2)
-    if n.size == 0:
+    most = min(400.0, s.span / (3 * step))
+    if most <= 3.0:
         return []
-    power = np.zeros(n.size)
-    weight = mass * s.v**2
-    for i in range(0, n.size, 64):
-        angle = 2 * np.pi * np.outer(n[i : i + 64], s.x / s.span)
-        for wave in (np.sin(angle), np.cos(angle)):
-            wave *= weight
-            power[i : i + 64] += (wave @ s.residual) ** 2 / np.maximum(np.sum(wave**2, axis=1), 1e-300)
+    n, power = periodogram(s.x, s.span, mass * s.v**2, s.residual, most)
+    power[n < 3.0] = 0.0
     found = []
     for _ in range(peaks):
         at = int(np.argmax(power))

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from rtcomp.diagnosis.periodogram import periodogram
 from rtcomp.diagnosis.scene import Column, Entry, Scene
 from rtcomp.kernels import Floats
 
@@ -90,16 +91,11 @@ def _periods(s: Scene, weight: Floats, peaks: int = 4) -> list[float]:
     found = [s.span / n for n in (1.0, 1.3, 1.7, 2.2, 2.8)]
     step = float(np.median(np.abs(np.diff(s.x)))) or s.span / 1000
     most = min(150.0, s.span / (6 * step))
-    n = np.arange(2.5, max(most, 3.0), 0.2)
-    power = np.zeros(n.size)
-    for i in range(0, n.size, 64):
-        angle = 2 * np.pi * np.outer(n[i : i + 64], s.x / s.span)
-        for wave in (np.sin(angle), np.cos(angle)):
-            wave *= weight
-            power[i : i + 64] += (wave @ s.residual) ** 2 / np.maximum(np.sum(wave**2, axis=1), 1e-300)
+    n, power = periodogram(s.x, s.span, weight, s.residual, max(most, 3.0))
+    power[n < 2.5] = 0.0
     for _ in range(peaks):
         at = int(np.argmax(power))
-        found.append(s.span / n[at])
+        found.append(s.span / float(n[at]))
         power[max(at - 3, 0) : at + 4] = 0.0
     return found
 
@@ -144,9 +140,9 @@ def _friction_along(s: Scene) -> list[Column]:
 
 
 def _tone(s: Scene) -> list[Column]:
-    strip = int(np.argmax([p.time.size for p in s.motion.strips]))
-    rows = s.motion.plain([s.motion.strips[strip].time]).size
-    start = sum(s.motion.plain([p.time]).size for p in s.motion.strips[:strip])
+    counts = [p.time[s.motion.kept(p)].size for p in s.motion.strips]
+    longest = int(np.argmax(counts))
+    rows, start = counts[longest], sum(counts[:longest])
     part = s.residual[start : start + rows]
     rate = s.motion.rate / s.motion.thinning
     spectrum = np.abs(np.fft.rfft(part * np.hanning(rows), 4 * rows)) ** 2

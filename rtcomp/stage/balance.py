@@ -207,5 +207,5 @@ def around_rows(force: Floats) -> Floats:
 
 
 def zero_phase(signal: Floats, cutoff_hz: float, rate_hz: float) -> Floats:
-    """Low-pass `signal` (K,) without delay: a second-order Butterworth forward and backward."""
+    """Low-pass `signal`, (K,) or (K, p), without delay: a second-order Butterworth forward and backward."""
     return lowpass.zero_phase(signal, cutoff_hz, rate_hz)

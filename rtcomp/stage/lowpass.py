@@ -37,26 +37,30 @@ def resting(one: Floats) -> Floats:
 
 
 def zero_phase(signal: Floats, cut_hz: float, rate_hz: float) -> Floats:
-    """Low-pass `signal` (K,), K above 9, at `cut_hz`, forward and backward: no delay."""
+    """Low-pass `signal`, (K,) or (K, p) by columns, K above 9, at `cut_hz`, there and back: no delay."""
     rows = np.asarray(signal, dtype=np.float64)
-    if rows.size <= PAD:
-        raise ValueError(f"{rows.size} rows; smoothing needs more than {PAD}")
+    if rows.shape[0] <= PAD:
+        raise ValueError(f"{rows.shape[0]} rows; smoothing needs more than {PAD}")
     out = np.concatenate([2 * rows[0] - rows[PAD:0:-1], rows, 2 * rows[-1] - rows[-2 : -PAD - 2 : -1]])
     one = section(cut_hz, rate_hz)
-    _there_and_back(one, resting(one), out)
+    _there_and_back(one, resting(one), out.reshape(out.shape[0], -1))
     return out[PAD:-PAD].copy()
 
 
 @compiled
 def _there_and_back(one: Floats, rest: Floats, x: Floats) -> None:
     b0, b1, b2, a1, a2 = one[0], one[1], one[2], one[4], one[5]
+    rows, columns = x.shape
+    s, t = np.empty(columns), np.empty(columns)
     for back in range(2):
-        first = x.size - 1 if back else 0
-        s, t = rest[0] * x[first], rest[1] * x[first]
-        for i in range(x.size):
-            k = x.size - 1 - i if back else i
-            given = x[k]
-            y = b0 * given + s
-            s = b1 * given - a1 * y + t
-            t = b2 * given - a2 * y
-            x[k] = y
+        first = rows - 1 if back else 0
+        for j in range(columns):
+            s[j], t[j] = rest[0] * x[first, j], rest[1] * x[first, j]
+        for i in range(rows):
+            k = rows - 1 - i if back else i
+            for j in range(columns):
+                given = x[k, j]
+                y = b0 * given + s[j]
+                s[j] = b1 * given - a1 * y + t[j]
+                t[j] = b2 * given - a2 * y
+                x[k, j] = y

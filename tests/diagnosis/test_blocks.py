@@ -41,3 +41,14 @@ def test_left_out_blocks_are_predicted_by_the_others() -> None:
         c = np.linalg.lstsq(a[number != k], y[number != k], rcond=None)[0]
         expected = np.sum((y[number == k] - a[number == k] @ c) ** 2)
         assert errors[k] == pytest.approx(expected, rel=1e-5)
+
+
+def test_further_columns_are_added_as_if_they_had_been_there() -> None:
+    a, y, _ = made(8)
+    block = np.arange(240) * 6 // 240
+    few = Blocks.of(a[:, :4], y, block, 6)
+    more = few.extended(a[:, :4], a[:, 4:], y, block)
+    whole = Blocks.of(a, y, block, 6)
+    use = np.ones(6, dtype=bool)
+    assert more.coefficients(use) == pytest.approx(whole.coefficients(use), rel=1e-9)
+    assert more.left_out(use) == pytest.approx(whole.left_out(use), rel=1e-9)

@@ -25,6 +25,12 @@ def test_it_is_the_librarys_filter(cut: float, seed: int, rows: int) -> None:
     assert zero_phase(signal, cut, rate) == pytest.approx(expected, rel=1e-7, abs=1e-7 * np.ptp(signal))
 
 
+def test_columns_are_smoothed_one_by_one() -> None:
+    table = np.cumsum(np.random.default_rng(5).standard_normal((300, 4)), axis=0)
+    expected = np.column_stack([zero_phase(column, 40.0, 1000.0) for column in table.T])
+    assert np.array_equal(zero_phase(table, 40.0, 1000.0), expected)
+
+
 @pytest.mark.parametrize("cut", [0.0, -1.0, 500.0, 700.0])
 def test_a_cutoff_that_makes_no_sense_is_refused(cut: float) -> None:
     with pytest.raises(ValueError, match="cutoff"):

@@ -1,0 +1,94 @@
+"""The ledger: friction as units, with what changes it at work, and what is compared of a recording."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from recorded import STAGE
+
+from rtcomp.diagnosis.bank import units_along
+from rtcomp.diagnosis.ledger import believed_weights
+from rtcomp.diagnosis.motion import WASHED, WINDOW_ROWS, WINDOWS, prepare
+from rtcomp.kernels import Floats
+from rtcomp.physics import build
+from rtcomp.physics.effect import Place
+from rtcomp.recording.reader import Recording
+from rtcomp.stage.balance import forces
+from rtcomp.stage.stage import Stage
+
+
+def wander(rows: int = 6000, size: float = 3e-5, seed: int = 2) -> tuple[Floats, Floats]:
+    """Time (s) and position (m) of a motion with loops of many sizes."""
+    time = np.arange(rows) / 1000.0
+    random = np.random.default_rng(seed)
+    waves = [
+        np.sin(2 * np.pi * f * time + p) / f
+        for f, p in zip((0.6, 1.7, 4.1), random.uniform(0, 6, 3), strict=True)
+    ]
+    return time, size * np.sum(waves, axis=0)
+
+
+MODIFIERS: list[list[dict[str, Any]]] = [
+    [],
+    [{"name": "stribeck", "rise": 0.3, "velocity": 1e-4}],
+    [{"name": "load-dependent-friction", "coefficient": 0.1}],
+    [{"name": "creep", "fraction": 0.3, "time_constant": 0.2}],
+    [{"name": "non-congruent-friction", "softening": 0.4}],
+    [{"name": "asymmetric-friction", "asymmetry": 0.2}, {"name": "non-congruent-friction", "softening": 0.3}],
+    [{"name": "stiction-ageing", "growth": 0.1, "distance": 1e-6}],
+    [
+        {"name": "frictional-lag", "time_constant": 0.02},
+        {"name": "asymmetric-viscous-friction", "ratio": 0.3},
+    ],
+]
+
+
+@pytest.mark.parametrize("entries", MODIFIERS, ids=lambda e: "+".join(d["name"] for d in e) or "none")
+def test_units_with_their_weights_are_the_stages_friction(entries: list[dict[str, Any]]) -> None:
+    """Whatever depends on the whole of friction must see the whole, not the unit."""
+    stage = Stage.from_dict(STAGE)
+    time, x = wander()
+    v = np.gradient(x, time)
+    held = np.sin(3.0 * time)
+    motion = np.column_stack([time, x, v, np.gradient(v, time), held])
+    modifiers = [build(e) for e in entries]
+    reaches = np.array([4e-6, 1.2e-5])
+    weights = believed_weights(stage, reaches)
+    drive = [e for e in stage.chain if e.place is Place.DRIVE]
+    table = units_along(stage, drive, modifiers, reaches, weights, motion, 0.0)
+    m = stage.mechanics
+    ours = table @ np.array([m.viscous, m.micro_damping, *weights])
+    chain = [
+        *drive,
+        *sorted([*modifiers, *(e for e in stage.chain if e.place is Place.FRICTION)], key=lambda e: e.order),
+    ]
+    whole = forces(stage, chain, time, x, v, motion[:, 3], held).friction
+    assert ours == pytest.approx(whole, abs=1e-9 * float(np.abs(whole).max()))
+
+
+def recording(time: Floats, x: Floats) -> Recording:
+    return Recording({"time": time, "position": x, "voltage": np.sin(time)}, 1000.0)
+
+
+def test_nothing_is_compared_until_friction_has_forgotten_what_was_before() -> None:
+    stage = Stage.from_dict(STAGE)
+    time, x = wander()
+    motion = prepare(stage, [recording(time, x)])
+    (strip,) = motion.strips
+    travelled = np.ptp(strip.position[: strip.lead + 1])
+    assert WASHED * 1.2e-5 <= travelled <= 1.3 * WASHED * 1.2e-5
+    assert motion.kept(strip).start > strip.lead
+
+
+def test_windows_of_a_long_recording_bring_their_lead_along() -> None:
+    stage = Stage.from_dict(STAGE)
+    time, x = wander(rows=400_000)
+    x[:100_000] = 0.0
+    motion = prepare(stage, [recording(time, x)])
+    assert len(motion.strips) == WINDOWS
+    for strip in motion.strips[2:]:
+        assert WASHED * 1.2e-5 <= np.ptp(strip.position[: strip.lead + 1]) <= 1.3 * WASHED * 1.2e-5
+        rows = (strip.time[-1] - strip.time[strip.lead]) * 1000.0
+        assert rows == pytest.approx(WINDOW_ROWS, rel=0.01)
