@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from rtcomp.report.terminal import Progress
 
 
+COLUMNS = ("time", "position", "voltage", "reference", "enabled", "status", "overrun", "gap", "outlier")
+"""What a diagnosis looks at of a recording."""
+
+
 @click.command()
 @click.argument(
     "recordings", nargs=-1, required=True, metavar="RECORDING...", type=click.Path(path_type=Path)
@@ -60,7 +64,7 @@ def diagnose(
     from rtcomp.stage.stage import Stage
 
     stage = Stage.load(stage_file)
-    data = [as_acted(read(path, mapping, rate_hz=rate)) for path in recordings]
+    data = [as_acted(read(path, mapping, rate_hz=rate, only=COLUMNS)) for path in recordings]
     several = len(data) > 1
     notes = [f"in {r.path.name}: {note}" if several else note for r in data for note in r.notes]
     notes += admit(stage, data)

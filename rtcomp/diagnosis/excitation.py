@@ -8,6 +8,7 @@ import numpy as np
 
 from rtcomp.errors import RecordingError
 from rtcomp.kernels import Floats
+from rtcomp.recording.pieces import pieces, steps
 from rtcomp.recording.reader import Recording
 
 CLIPPED = 0.5
@@ -30,7 +31,7 @@ def moved(recording: Recording, noise: float) -> None:
             "record it again"
         )
     span = float(np.ptp(voltage))
-    if span <= 1e-12 * float(np.max(np.abs(voltage))):
+    if span <= 1e-12 * _largest(voltage):
         raise RecordingError(
             f"{path}: voltage is {voltage[0]:g} V in every row; a diagnosis needs a command that changes"
         )
@@ -43,7 +44,8 @@ def moved(recording: Recording, noise: float) -> None:
                 f"resolution alone make ({floor:.3g} m); command more than friction holds"
             )
         return
-    white = float(np.std(np.diff(position, 2)) / np.sqrt(6.0))
+    parts = [position[max(p.start - 2, 0) : p.stop] for p in pieces(len(position))]
+    white = float(np.sqrt(np.mean([np.var(np.diff(part, 2)) for part in parts if part.size > 2]) / 6.0))
     if float(np.std(position)) < 1.5 * white:
         raise RecordingError(
             f"{path}: nothing moved: position stays within {travel:.3g} m and is noise from row to row; "
@@ -55,7 +57,7 @@ def clipping(recording: Recording, voltage_limit: float) -> list[str]:
     """Return notes on columns that sit at their extremes; raise RecordingError where that is most rows."""
     notes = []
     voltage, position = recording.voltage, recording.position
-    largest = float(np.max(np.abs(voltage)))
+    largest = _largest(voltage)
     share = _at_extremes(voltage)
     if share > CLIPPED:
         raise RecordingError(
@@ -79,10 +81,11 @@ def clipping(recording: Recording, voltage_limit: float) -> list[str]:
             f"position is exactly at its highest or lowest value in {100 * share:.0f} % of the rows: resting "
             "there, or clipped"
         )
-    again = (np.diff(position) == 0) & (np.diff(voltage) == 0)
-    if again.mean() > 0.3:
+    both = zip(steps(position), steps(voltage), strict=True)
+    again = sum(np.count_nonzero((x == 0) & (u == 0)) for (_, x), (_, u) in both) / (len(position) - 1)
+    if again > 0.3:
         notes.append(
-            f"{100 * again.mean():.0f} % of the rows repeat the one before: recorded faster than measured? "
+            f"{100 * again:.0f} % of the rows repeat the one before: recorded faster than measured? "
             "--rate takes fewer"
         )
     bridged = 1.0 - float(recording.trusted.mean())
@@ -129,6 +132,11 @@ def reversals(position: Floats) -> int:
             way, low = -1, value
             high = value
     return count
+
+
+def _largest(column: Floats) -> float:
+    """Return the largest magnitude."""
+    return max(abs(float(column.max())), abs(float(column.min())))
 
 
 def _at_extremes(column: Floats) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect
 from rtcomp.physics.maxwell_slip import MaxwellSlip
+from rtcomp.recording.pieces import bridged
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.balance import zero_phase
 from rtcomp.stage.stage import Stage
@@ -132,8 +133,7 @@ def unstepped(position: Floats, cut: float, rate: float) -> Floats:
 
 
 def _whole(recording: Recording, reach: float) -> Strip:
-    good = recording.trusted
-    position = np.interp(recording.time, recording.time[good], recording.position[good])
+    position = bridged(recording.position, recording.trusted)
     strip = Strip(recording.time - recording.time[0], position, recording.voltage, recording.reference)
     washed = np.maximum.accumulate(position) - np.minimum.accumulate(position) >= WASHED * reach
     first = int(np.argmax(washed))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,9 @@ import numpy as np
 from rtcomp.errors import RecordingError
 from rtcomp.recording.superblock import END_OF_FILE, FLAGS, SIGNATURE, SIZE, VERSION
 from rtcomp.recording.table import Floats, Table
+
+LONG = 250_000
+"""Rows from which on a column that nobody asked for stays in its file."""
 
 
 def read_mat5(path: Path) -> Table:
@@ -33,10 +36,11 @@ def read_mat5(path: Path) -> Table:
     return _table({k: v for k, v in content.items() if not k.startswith("__")})
 
 
-def read_hdf5(path: Path) -> Table:
+def read_hdf5(path: Path, only: Collection[str] | None = None) -> Table:
     """Read an HDF5 file: the program's own (also after a kill, also while being written) or MATLAB 7.3.
 
-    Raises RecordingError where it is truncated or damaged.
+    Of long columns (a quarter of a million rows) those whose name is not in `only` are left out. Raises
+    RecordingError where it is truncated or damaged.
     """
     import h5py
 
@@ -44,8 +48,8 @@ def read_hdf5(path: Path) -> Table:
         # The way that also reads a file while it is being written; only its newer form can be read so.
         with h5py.File(path, "r", swmr=_superblock_is_new(path)) as file:
             if _ours(file):
-                return _own(file)
-            table = _table(_tree(file))
+                return _own(file, only)
+            table = _table(_tree(file, only))
             table.metadata |= {k: _plain(v) for k, v in file.attrs.items()}
             return table
     except (OSError, RuntimeError, KeyError) as error:
@@ -73,10 +77,18 @@ def _ours(file: Any) -> bool:
     return str(file.attrs.get("format", "")).startswith("rtcomp recording")
 
 
-def _own(file: Any) -> Table:
+def _wanted(item: Any, name: str, only: Collection[str] | None) -> bool:
+    """Return whether the dataset `name` is to be read: short, or asked for by name or by path."""
+    if only is None or item.size <= LONG:
+        return True
+    return name in only or any(one.rsplit(".", 1)[-1].partition(":")[0] == name for one in only)
+
+
+def _own(file: Any, only: Collection[str] | None) -> Table:
     """Read a recording of the program's own, cut to the rows that all its columns have."""
     metadata = {key: _plain(value) for key, value in file.attrs.items()}
-    columns = {name: item[()] for name, item in file.items() if getattr(item, "ndim", 0) == 1}
+    datasets = {name: item for name, item in file.items() if getattr(item, "ndim", 0) == 1}
+    columns = {name: item[()] for name, item in datasets.items() if _wanted(item, name, only)}
     notes = []
     rows = min((len(column) for column in columns.values()), default=0)
     if not metadata.get("complete"):
@@ -95,7 +107,7 @@ def _own(file: Any) -> Table:
     return Table({name: column[:rows] for name, column in columns.items()}, metadata, notes, weights)
 
 
-def _tree(group: Any) -> dict[str, Any]:
+def _tree(group: Any, only: Collection[str] | None) -> dict[str, Any]:
     """Read a group into nested dicts as `loadmat` makes them; MATLAB's own bookkeeping is left out."""
     import h5py
 
@@ -104,8 +116,8 @@ def _tree(group: Any) -> dict[str, Any]:
         if name.startswith("#"):
             continue
         if isinstance(item, h5py.Group):
-            tree[name] = _tree(item)
-        elif isinstance(item, h5py.Dataset) and item.dtype.kind in "fiub":
+            tree[name] = _tree(item, only)
+        elif isinstance(item, h5py.Dataset) and item.dtype.kind in "fiub" and _wanted(item, name, only):
             if item.attrs.get("MATLAB_class") == b"char":
                 tree[name] = "".join(map(chr, np.ravel(item[()])))
             elif not item.attrs.get("MATLAB_empty", 0):
@@ -130,7 +142,7 @@ def _table(tree: Mapping[str, Any]) -> Table:
         array = np.squeeze(np.asarray(value))
         if array.dtype.kind not in "fiub":
             continue
-        array = array.astype(np.float64)
+        array = array.astype(np.float64, copy=False)
         if array.ndim == 0:
             table.metadata[where] = float(array)
         elif array.ndim == 1:

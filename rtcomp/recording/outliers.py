@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from rtcomp.recording.pieces import Floats, pieces, sample
 
 WINDOW = 7
 """Samples of the running median: up to 3 wrong ones in a row are found, steps and ramps pass."""
 SPREAD_WINDOW = 51
 STEP_WINDOW = 15
+REACH = 64
+"""Samples to either side that decide about one: half of all windows together, and some."""
 THRESHOLD = 8.0
 COMMAND_THRESHOLD = 16.0
 """For a command: a controller that differentiates a coarse sensor spikes of its own."""
@@ -23,22 +25,44 @@ def outliers(signal: Floats, threshold: float = THRESHOLD) -> npt.NDArray[np.boo
 
     A sample is one where it lies further from the running median of its neighbourhood than `threshold` times
     the robust spread: the largest of 1.4826 times the median of such distances around it, the same of the
-    whole signal, and the usual step from sample to sample around it. (Hampel 1974, J. Am. Stat. Assoc.
-    69:383, with a spread that neither a coarse sensor nor a fast oscillation of the signal deceives.)
+    whole signal (of a long one, of stretches of it), and the usual step from sample to sample around it.
+    (Hampel 1974, J. Am. Stat. Assoc. 69:383, with a spread that neither a coarse sensor nor a fast
+    oscillation of the signal deceives.)
     """
-    from scipy.ndimage import median_filter
-
     if len(signal) < SPREAD_WINDOW:
         return np.zeros(len(signal), dtype=np.bool_)
-    distance = np.abs(signal - median_filter(signal, WINDOW, mode="nearest"))
+    parts = sample(signal)
+    usual = float(np.median(np.concatenate([_distance(part) for part in parts])))
+    least = COUNTS * _resolution(parts)
+    found = np.empty(len(signal), dtype=np.bool_)
+    for piece in pieces(len(signal)):
+        begin = max(piece.start - REACH, 0)
+        near = signal[begin : piece.stop + REACH]
+        inside = slice(piece.start - begin, piece.stop - begin)
+        found[piece] = _far(near, threshold, usual, least)[inside]
+    return found
+
+
+def _distance(signal: Floats) -> Floats:
+    """Return how far each sample is from the running median of its neighbourhood."""
+    from scipy.ndimage import median_filter
+
+    return np.asarray(np.abs(signal - median_filter(signal, WINDOW, mode="nearest")))
+
+
+def _far(signal: Floats, threshold: float, usual: float, least: float) -> npt.NDArray[np.bool_]:
+    from scipy.ndimage import median_filter
+
+    distance = _distance(signal)
     nearby = median_filter(distance, SPREAD_WINDOW, mode="nearest")
     step = median_filter(np.abs(np.diff(signal, prepend=signal[0])), STEP_WINDOW, mode="nearest")
-    spread = np.maximum(1.4826 * np.maximum(nearby, np.median(distance)), step)
-    return np.asarray(distance > np.maximum(threshold * spread, COUNTS * _resolution(signal)))
+    spread = np.maximum(1.4826 * np.maximum(nearby, usual), step)
+    return np.asarray(distance > np.maximum(threshold * spread, least))
 
 
-def _resolution(signal: Floats) -> float:
+def _resolution(parts: list[Floats]) -> float:
     """Return the smallest usual step between different neighbours: the sensor's count, or the noise."""
-    steps = np.abs(np.diff(signal))
-    steps = steps[steps > 1e-12 * np.ptp(signal)]
+    span = max(float(part.max()) for part in parts) - min(float(part.min()) for part in parts)
+    steps = np.concatenate([np.abs(np.diff(part)) for part in parts])
+    steps = steps[steps > 1e-12 * span]
     return float(np.quantile(steps, 0.25)) if len(steps) else 0.0

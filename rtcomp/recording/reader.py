@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.recording import table as tables
+from rtcomp.recording.pieces import pieces, steps
 from rtcomp.recording.sampling import METHODS, Sampling, examine, in_gap, marks, resample
 from rtcomp.recording.table import Floats, Table
 
@@ -84,6 +85,7 @@ def read(
     method: str = "cubic",
     needed: Sequence[str] = NEEDED,
     mark_outliers: bool = True,
+    only: Sequence[str] | None = None,
 ) -> Recording:
     """Read the recording at `path`, a file, or a folder that holds one recording and no more.
 
@@ -91,7 +93,8 @@ def read(
     to `rate_hz` (default: their median rate) by `method` ``cubic`` or ``linear``; even rows only where
     `rate_hz` asks for another rate than theirs. A file without ``time`` is read at the given `rate_hz`.
     Outliers of position and voltage are marked in the column ``outlier``, rows bridged across gaps in the
-    column ``gap``; nothing is removed but second rows of the same time.
+    column ``gap``; nothing is removed but second rows of the same time. With `only`, other columns than
+    these and the mapped ones are left in the file where it is large: an hour at 10 kHz fits into memory.
 
     Raises RecordingError where the file is missing, truncated, not what its name says, lacks a column of
     `needed` or a mapped one, holds NaN or infinity in `needed` or ``reference``, a constant position, time
@@ -104,9 +107,14 @@ def read(
         raise ConfigError(f"resampling method is {method!r}; it must be one of {', '.join(METHODS)}")
     if path.is_dir():
         path = tables.recording_in(path)
-    table = load(path)
-    _rename(path, table, column_map or {})
+    mapping = column_map or {}
+    table = load(path, None if only is None else {*mapping.values(), *only})
+    if only is not None and not {*mapping.values(), *needed} <= {*table.columns, *mapping}:
+        table = load(path)  # to say what is there instead
+    _rename(path, table, mapping)
     _one_length(path, table, needed, rate_hz)
+    if only is not None:
+        table.columns = {name: column for name, column in table.columns.items() if name in {*only, *mapping}}
     _check(path, table.columns, needed)
     _drop_repeated_times(table)
     sampling = examine(table.columns["time"])
@@ -115,20 +123,23 @@ def read(
     return Recording(columns, rate, table.metadata, path, table.notes, weights, weights_time)
 
 
-def load(path: Path) -> Table:
-    """Read the file at `path` as it is, nothing checked but that it is whole; raise RecordingError."""
+def load(path: Path, only: Collection[str] | None = None) -> Table:
+    """Read the file at `path` as it is, nothing checked but that it is whole; raise RecordingError.
+
+    Of a large file, columns not in `only` may be left out.
+    """
     found = tables.kind(path)
     if found == tables.HDF5:
         from rtcomp.recording.containers import read_hdf5
 
-        return read_hdf5(path)
+        return read_hdf5(path, only)
     if found == tables.MAT5:
         from rtcomp.recording.containers import read_mat5
 
         return read_mat5(path)
     from rtcomp.recording.text import read_text
 
-    return read_text(path, found == tables.GZIP)
+    return read_text(path, found == tables.GZIP, only)
 
 
 def parse_map(items: Iterable[str]) -> dict[str, str]:
@@ -187,7 +198,7 @@ def _check(path: Path, columns: Mapping[str, Floats], needed: Sequence[str]) -> 
     for name in dict.fromkeys(("time", *needed, "reference")):
         if name not in columns:
             continue
-        bad = ~np.isfinite(columns[name])
+        bad = ~np.isfinite(columns[name])  # a byte a row
         if bad.any():
             first = int(np.argmax(bad))
             value = "NaN" if np.isnan(columns[name][first]) else "infinite"
@@ -196,18 +207,18 @@ def _check(path: Path, columns: Mapping[str, Floats], needed: Sequence[str]) -> 
                 "are not finite; cut them out or repair them first"
             )
     time = columns["time"]
-    back = np.diff(time) < 0
-    if back.any():
-        row = int(np.argmax(back)) + 1
-        raise RecordingError(
-            f"{path}: time goes back in row {row + 1}, from {time[row - 1]:.9g} s to {time[row]:.9g} s; "
-            "it must increase (two recordings in one file?)"
-        )
+    for first, step in steps(time):
+        if (step < 0).any():
+            row = first + int(np.argmax(step < 0)) + 1
+            raise RecordingError(
+                f"{path}: time goes back in row {row + 1}, from {time[row - 1]:.9g} s to {time[row]:.9g} s; "
+                "it must increase (two recordings in one file?)"
+            )
     if time[-1] == time[0]:
         raise RecordingError(f"{path}: time is {time[0]:g} s in every row")
     if "position" in needed:
         position = columns["position"]
-        if np.ptp(position) <= 1e-15 * np.max(np.abs(position)):
+        if np.ptp(position) <= 1e-15 * max(abs(float(position.max())), abs(float(position.min()))):
             raise RecordingError(
                 f"{path}: position is constant ({position[0]:g} in all {len(position)} rows); nothing moved, "
                 "or the wrong column is mapped"
@@ -216,8 +227,9 @@ def _check(path: Path, columns: Mapping[str, Floats], needed: Sequence[str]) -> 
 
 def _drop_repeated_times(table: Table) -> None:
     """Keep the first of rows that share a time."""
-    again = np.diff(table.columns["time"], prepend=-np.inf) == 0
-    if again.any():
+    time = table.columns["time"]
+    if any((step == 0).any() for _, step in steps(time)):
+        again = np.diff(time, prepend=-np.inf) == 0
         first = int(np.argmax(again)) + 1
         table.notes.append(
             f"{_count(again.sum(), 'row')} of a time already seen (first: row {first}): left out"
@@ -236,7 +248,10 @@ def _even(
     rate = sampling.rate_hz if wanted is None else wanted
     if sampling.even and same:
         if sampling.jitter > 1e-3:
-            columns["time"] = time[0] + np.arange(len(time)) / rate
+            even_time = np.empty_like(time)
+            for part in pieces(len(time)):
+                even_time[part] = time[0] + np.arange(part.start, part.stop) / rate
+            columns["time"] = even_time
         if sampling.jitter > 1e-2:
             notes.append(
                 f"time stamps jitter by {100 * sampling.jitter:.0f} % of the period at most: taken as even"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from rtcomp.recording.pieces import Floats, pieces, sample, steps
 
 JITTER = 0.1
 """Deviation from the even grid, in periods, up to which samples count as evenly spaced."""
@@ -39,10 +39,15 @@ class Sampling:
 
 def examine(time: Floats) -> Sampling:
     """Return how `time` (s, increasing, at least two rows) is sampled."""
-    intervals = np.diff(time)
-    gaps = np.flatnonzero(intervals > GAP * np.quantile(intervals, 0.95))
-    period = (time[-1] - time[0]) / (len(time) - 1)
-    deviation = float(np.max(np.abs(time - time[0] - period * np.arange(len(time))))) / period
+    intervals = np.concatenate([np.diff(part) for part in sample(time)])
+    usual = float(np.quantile(intervals, 0.95))
+    gaps = np.concatenate([first + np.flatnonzero(step > GAP * usual) for first, step in steps(time)])
+    period = float(time[-1] - time[0]) / (len(time) - 1)
+    deviation = max(
+        float(np.max(np.abs(time[part] - time[0] - period * np.arange(part.start, part.stop))))
+        for part in pieces(len(time))
+    )
+    deviation /= period
     if deviation > JITTER or len(gaps):
         period = float(np.median(intervals))
     return Sampling(_round(1.0 / period), deviation, gaps)
@@ -86,7 +91,14 @@ def _interpolate(time: Floats, column: Floats, grid: Floats, method: str, name: 
     if method == "cubic" and name in SMOOTH and np.all(np.isfinite(column)):
         from scipy.interpolate import PchipInterpolator
 
-        return np.asarray(PchipInterpolator(time, column)(np.minimum(grid, time[-1])))
+        out = np.empty_like(grid)
+        for part in pieces(len(grid)):
+            # The slopes at a row are made of it and its neighbours: a piece needs two more on either side.
+            begin = max(int(np.searchsorted(time, grid[part.start])) - 3, 0)
+            end = int(np.searchsorted(time, grid[part.stop - 1])) + 4
+            near = PchipInterpolator(time[begin:end], column[begin:end])
+            out[part] = near(np.minimum(grid[part], time[-1]))
+        return out
     return np.interp(grid, time, column)
 
 

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import gzip
+import io
+import itertools
 import re
 import zlib
+from collections.abc import Collection, Iterable
 from pathlib import Path
+from typing import IO, NamedTuple, cast
 
 import numpy as np
 
@@ -13,20 +17,52 @@ from rtcomp.errors import RecordingError
 from rtcomp.recording.table import CSV, Floats, Table, kind_of
 
 _CONTRACT = ("time", "reference", "position", "voltage")
+LARGE = 100_000_000
+"""Bytes from which on a file is read in pieces."""
+CUT = "the last line is cut off in the middle: left out"
+_HEADER_LINES, _LINES = 1000, 200_000
 _SEPARATORS = ("\t", ";", ",")
 
 
-def read_text(path: Path, gzipped: bool) -> Table:
+def read_text(path: Path, gzipped: bool, only: Collection[str] | None = None) -> Table:
     """Read a CSV file: the header line names the columns, ``#`` begins a comment, separators ``,`` ``;`` tab.
 
-    Raises RecordingError where it is truncated, has no header line, or holds text for numbers.
+    A large file is read in pieces, and columns that are not in `only` are left out of it. Raises
+    RecordingError where it is truncated, has no header line, or holds text for numbers.
     """
+    if path.stat().st_size > (LARGE // 8 if gzipped else LARGE):
+        table = _in_pieces(path, gzipped, only)
+        if table is not None:
+            return table
     text = _decode(path, _unpack(path) if gzipped else path.read_bytes())
     lines = text.split("\n")
+    head = _head(path, lines)
+    body = [line for line in lines[head.rows :] if line.strip() and not line.startswith("#")]
+    notes: list[str] = []
+    if head.separator == ";" and body and "," in body[0] and "." not in body[0]:
+        body = [line.replace(",", ".") for line in body]
+        notes.append("decimal commas read as points")
+    if body and not text.endswith("\n") and len(_split(body[-1], head.separator)) < len(head.names):
+        notes.append(CUT)
+        body.pop()
+    columns = _numbers(path, head.names, body, head.separator, notes)
     comments = [line.lstrip("# \t").rstrip() for line in lines if line.startswith("#")]
+    return Table(columns, {"comments": "\n".join(comments)} if comments else {}, notes)
+
+
+class _Head(NamedTuple):
+    """What stands before the numbers: columns' names, what separates them, lines until the first row."""
+
+    names: list[str]
+    separator: str | None
+    rows: int
+
+
+def _head(path: Path, lines: list[str]) -> _Head:
     first = next((i for i, line in enumerate(lines) if line.strip() and not line.startswith("#")), None)
     if first is None:
         raise RecordingError(f"{path}: holds no rows")
+    comments = [line.lstrip("# \t").rstrip() for line in lines if line.startswith("#")]
     header, separator = lines[first], _separator(lines[first])
     names = _split(header, separator)
     start = first + 1
@@ -39,16 +75,40 @@ def read_text(path: Path, gzipped: bool) -> Table:
     if len(set(names)) != len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise RecordingError(f"{path}: two columns are named {twice!r}")
-    notes: list[str] = []
-    body = [line for line in lines[start:] if line.strip() and not line.startswith("#")]
-    if separator == ";" and body and "," in body[0] and "." not in body[0]:
-        body = [line.replace(",", ".") for line in body]
-        notes.append("decimal commas read as points")
-    if body and not text.endswith("\n") and len(_split(body[-1], separator)) < len(names):
-        notes.append("the last line is cut off in the middle: left out")
-        body.pop()
-    columns = _numbers(path, names, body, separator, notes)
-    return Table(columns, {"comments": "\n".join(comments)} if comments else {}, notes)
+    return _Head(names, separator, start)
+
+
+def _in_pieces(path: Path, gzipped: bool, only: Collection[str] | None) -> Table | None:
+    """Read a large file of plain numbers; None for anything unusual, which the other way reads or refuses."""
+    parts: list[list[Floats]] = []
+    try:
+        with gzip.open(path, "rb") if gzipped else path.open("rb") as raw:
+            start = raw.read(4096)
+            if start.startswith((b"\xff\xfe", b"\xfe\xff")) or kind_of(start) != CSV:
+                return None
+            raw.seek(0)
+            with io.TextIOWrapper(cast(IO[bytes], raw), encoding="utf-8-sig", errors="replace") as text:
+                lines = [line.rstrip("\n") for line in itertools.islice(text, _HEADER_LINES)]
+                head = _head(path, lines)
+                kept = [i for i, name in enumerate(head.names) if only is None or name in only]
+                if not kept:
+                    return None
+                comments = [line.lstrip("# \t").rstrip() for line in lines if line.startswith("#")]
+                body: Iterable[str] = lines[head.rows :]
+                while body := [line for line in body if line.strip() and not line.startswith("#")]:
+                    table = np.loadtxt(body, delimiter=head.separator, comments=None, ndmin=2)
+                    if table.shape[1] != len(head.names):
+                        return None
+                    parts.append([np.ascontiguousarray(table[:, i]) for i in kept])
+                    body = list(itertools.islice(text, _LINES))
+    except (EOFError, OSError, zlib.error, ValueError):
+        return None
+    columns: dict[str, Floats] = {}
+    for position, index in enumerate(kept):
+        columns[head.names[index]] = np.concatenate([part[position] for part in parts])
+        for part in parts:
+            part[position] = np.empty(0)
+    return Table(columns, {"comments": "\n".join(comments)} if comments else {})
 
 
 def _unpack(path: Path) -> bytes:
