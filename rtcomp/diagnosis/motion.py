@@ -135,9 +135,10 @@ def unstepped(position: Floats, cut: float, rate: float) -> Floats:
 def _whole(recording: Recording, reach: float) -> Strip:
     position = bridged(recording.position, recording.trusted)
     strip = Strip(recording.time - recording.time[0], position, recording.voltage, recording.reference)
-    washed = np.maximum.accumulate(position) - np.minimum.accumulate(position) >= WASHED * reach
+    begin = position[: int(LEAD * position.size) + 1]
+    washed = np.maximum.accumulate(begin) - np.minimum.accumulate(begin) >= WASHED * reach
     first = int(np.argmax(washed))
-    late = not washed[first] or first > LEAD * washed.size
+    late = not washed[first]
     return replace(strip, lead=0 if late else first)
 
 
