@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -22,13 +23,15 @@ from rtcomp.diagnosis.result import (
     Named,
     Place,
     Retuned,
+    Sight,
     Value,
     Verdict,
 )
 from rtcomp.diagnosis.scene import Entry
+from rtcomp.diagnosis.sight import sight
 from rtcomp.errors import RtcompError
 from rtcomp.kernels import Floats
-from rtcomp.physics import catalogue, entries
+from rtcomp.physics import catalogue
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.balance import force_balance
@@ -42,9 +45,6 @@ STRUCTURED = 0.3
 """Part of the remaining mismatch that depends on one axis, from which on names are taken back."""
 MODEL = 0.005
 """Relative half width of an interval that no amount of data removes: kernels and friction grid are models."""
-UNSEEABLE = ("sensor-scale",)
-"""Entries that no recording of position and voltage shows: they scale everything."""
-
 Progress = Callable[[float, str], None]
 Located = Callable[[float, Sequence[Place]], None]
 """Told, before anything is named, what part of the force the refitted stage leaves open (rms), and where."""
@@ -108,6 +108,10 @@ def diagnose(
         where = []
     elif verdict == "unexplained" and not effects:
         effects = [Named(("unexplained",), 1.0, {}, 1.0)]
+    say(0.6, "locate")
+    sights = sight(motion, final, entries_found if final is not base else [], least)
+    seen_here = {name for effect in effects for name in effect.names}
+    retuned, flat = _pinned(retuned, sights)
     say(0.8, "locate")
     experiment = None
     for choice in decision.choices:
@@ -121,11 +125,12 @@ def diagnose(
         retuned if verdict != "consistent" else [],
         effects,
         fit,
-        _not_observable(decision),
+        [s.name for s in sights if not s.seen and s.name not in seen_here],
         extended,
         experiment,
-        _candidates(decision, base),
-        _notes(motion, recordings),
+        sights,
+        _candidates(decision, base, sights),
+        [*_notes(motion, recordings), *flat],
         motion.plain([s.time for s in motion.strips]),
         base.residual,
         final.residual,
@@ -252,6 +257,24 @@ def _retuned(believed: Stage, final: Fitted, extended: Stage) -> list[Retuned]:
     return found
 
 
+BASE_OF = {"mass": "inertia", "viscous": "viscous-friction"}
+"""Parameters of the stage whose change is an entry of the catalogue."""
+
+
+def _pinned(retuned: list[Retuned], sights: Sequence[Sight]) -> tuple[list[Retuned], list[str]]:
+    """Return what moved by so much that this motion shows it, and a note for each that it leaves open."""
+    from_size = {s.name: s.smallest for s in sights}
+    flat = [
+        r
+        for r in retuned
+        if abs(r.after.value - r.before) < 0.5 * from_size.get(BASE_OF.get(r.parameter, ""), 0.0)
+    ]
+    notes = [
+        f"{r.parameter} is not pinned by this motion: the stage's is as good as any like it" for r in flat
+    ]
+    return [r for r in retuned if r not in flat], notes
+
+
 def _tell_apart(
     choice: Choice, named: list[Entry], stage: Stage, final: Fitted, motion: Motion
 ) -> Experiment | None:
@@ -289,25 +312,20 @@ def _like(entry: Entry, name: str, stage: Stage) -> Entry | None:
     return None
 
 
-def _candidates(decision: Decision, base: Fitted) -> list[Candidate]:
-    found = []
+def _candidates(decision: Decision, base: Fitted, sights: Sequence[Sight]) -> list[Candidate]:
+    found, from_size = [], {s.name: s for s in sights}
     for s in decision.first_look:
         gained = base.errors - s.errors
         scatter = float(gained.std(ddof=1) * np.sqrt(gained.size)) or 1e-300
         gain = max(s.gain(base.errors), decision.first_refined.get(s.name, -np.inf))
-        found.append(Candidate(s.name, gain, float(gained.sum()) / scatter, True))
-    found += [Candidate(n, 0.0, 0.0, False) for n in _not_observable(decision)]
+        at = from_size.pop(s.name, None)
+        z = float(gained.sum()) / scatter
+        if at is None:
+            found.append(Candidate(s.name, gain, z, True))
+        else:
+            found.append(Candidate(s.name, gain, z, at.seen, at.smallest, parameter=at.parameter))
+    found += [Candidate(s.name, 0.0, math.nan, False) for s in from_size.values() if not s.seen]
     return sorted(found, key=lambda c: -c.gain)
-
-
-def _not_observable(decision: Decision) -> list[str]:
-    """Return the entries that this recording could not have shown."""
-    if not decision.first_look:
-        return list(UNSEEABLE)
-    tried = {s.name for s in decision.first_look}
-    models = {"dahl", "gms", "leuven", "lugre", "maxwell-slip", "modified-leuven", "micro-damping"}
-    alike = {"constant-force", "gravity", "back-emf", "sensor-noise", "sensor-resolution"}
-    return [e.name for e in entries() if e.name not in tried | models | alike]
 
 
 def _notes(motion: Motion, recordings: Sequence[Recording]) -> list[str]:

@@ -132,8 +132,41 @@ class Candidate:
     observable: bool
     """Whether this recording's motion could show it at all."""
     smallest: float = math.nan
-    """The size of its first parameter that would have been seen (catalogue unit); NaN where not known."""
+    """Size from which on it would have been seen (catalogue unit); NaN where not known."""
     note: str = ""
+    parameter: str = ""
+    """Which of its parameters that size is; the first where nothing is said."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """From which size on an entry of the catalogue would have been seen in these recordings."""
+
+    name: str
+    parameter: str
+    """Which of its parameters is its size."""
+    unit: str
+    smallest: float
+    """How far that parameter must be from doing nothing; infinite where the refitted base makes up for it."""
+    most: float
+    """Up to which that is plausible."""
+    beside: dict[str, float]
+    """Its other parameters, at which this holds."""
+
+    @property
+    def seen(self) -> bool:
+        """Whether a plausible size would have been seen."""
+        return self.smallest <= self.most
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as the contract writes it."""
+        return {
+            "name": self.name,
+            "parameter": self.parameter,
+            "value": self.smallest,
+            "unit": self.unit,
+            "at": self.beside,
+        }
 
 
 @dataclass(frozen=True)
@@ -160,6 +193,8 @@ class Diagnosis:
     stage: Stage
     """The extended stage."""
     next_experiment: Experiment | None = None
+    sights: Sequence[Sight] = ()
+    """From which size on each entry would have been seen; those of `not_observable` among them."""
     candidates: Sequence[Candidate] = ()
     """Every entry looked at, by gain, largest first."""
     notes: Sequence[str] = field(default_factory=list)
@@ -205,6 +240,7 @@ class Diagnosis:
                 }
             },
             "not_observable": list(self.not_observable),
+            "smallest_seen": [s.to_json() for s in self.sights if s.seen],
             "notes": list(self.notes),
         }
         if self.next_experiment is not None:

@@ -18,6 +18,8 @@ from rtcomp.report.diagnosis_words import (
     about,
     cells,
     entry,
+    from_size,
+    holding,
     joined,
     next_command,
     percent,
@@ -99,6 +101,7 @@ def diagnosed_page(found: Diagnosis, recordings: Sequence[str], stage: str, out:
             *_retuned(found),
             *_candidates(found),
             *_not_seen(found),
+            *_would_show(found),
             *_next(found.next_experiment, stage, out, unit),
         ],
         configuration=dump_yaml(None, found.stage.to_dict()),
@@ -242,9 +245,28 @@ def _not_seen(found: Diagnosis) -> list[Section]:
     for name in found.not_observable:
         known = entry(name)
         rows.append((name, known.says if known else "", known.experiment if known else ""))
-    says = "The motion of these recordings would look the same with and without them."
+    says = (
+        "The motion of these recordings would look the same with and without them: of any plausible size, "
+        "other values of the stage would make up for them to within the noise."
+    )
     table = Columns(("Effect", "What it is", "Seen by"), rows)
-    return [Section("What could not be seen", says, None, table)]
+    return [Section("What could not be seen in this recording", says, None, table)]
+
+
+def _would_show(found: Diagnosis) -> list[Section]:
+    axis = found.stage.axis
+    rows = [(s.name, from_size(s, axis, printed=True), holding(s, axis)) for s in found.sights if s.seen]
+    if not rows:
+        return []
+    says = (
+        "From these sizes on each effect would stand out of the noise of these recordings, with everything "
+        "else refitted. Smaller ones may be there."
+    )
+    return [
+        Section(
+            "The smallest that would have been seen", says, None, Columns(("Effect", "From", "With"), rows)
+        )
+    ]
 
 
 def _next(experiment: Experiment | None, stage: str, out: str, unit: str) -> list[Section]:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from rtcomp.diagnosis.result import Diagnosis, Named, Place
 from rtcomp.report.diagnosis_words import (
     UNEXPLAINED,
+    from_size,
     joined,
     next_command,
     percent,
@@ -39,6 +40,10 @@ def diagnosis_text(found: Diagnosis, out: str) -> str:
     lines += _block("Force error", [_fit(found)])
     if found.not_observable:
         lines += _block("Not seen", [f"in this motion: {', '.join(found.not_observable)}"])
+    if found.verdict in ("consistent", "retuned"):
+        axis = found.stage.axis
+        sizes = [f"{s.name} {from_size(s, axis, printed=False)}" for s in found.sights if s.seen]
+        lines += _block("Would show", [f"from these sizes on: {', '.join(sizes)}"] if sizes else [])
     if found.next_experiment is not None:
         e = found.next_experiment
         unit = for_axis("m", found.stage.axis)

@@ -6,11 +6,14 @@ import math
 from collections.abc import Sequence
 
 from rtcomp import physics
-from rtcomp.diagnosis.result import Candidate, Diagnosis, Named, Value
+from rtcomp.diagnosis.result import Candidate, Diagnosis, Named, Sight, Value
 from rtcomp.errors import ConfigError
 from rtcomp.report.quantities import scale, typeset, written
+from rtcomp.units import for_axis
 
 UNEXPLAINED = ("unexplained",)
+OFF_BY = ("drive-gain", "drive-saturation", "inertia", "sensor-scale")
+"""Effects whose parameter does nothing at a value of its own, not at zero."""
 
 
 def share_explained(found: Diagnosis) -> float:
@@ -79,8 +82,22 @@ def smallest(candidate: Candidate) -> str:
     known = entry(candidate.name)
     if known is None or not known.parameters or not math.isfinite(candidate.smallest):
         return ""
-    first = known.parameters[0]
-    return f"{first.name} {written(candidate.smallest, first.unit, 2, printed=True)}"
+    name = candidate.parameter or known.parameters[0].name
+    unit = next((p.unit for p in known.parameters if p.name == name), "")
+    return f"{name} {written(candidate.smallest, unit, 2, printed=True)}"
+
+
+def from_size(sight: Sight, axis: str, *, printed: bool) -> str:
+    """Return from which size on an effect would have been seen: ``amplitude 39 mN``."""
+    how = "by " if sight.name in OFF_BY else ""
+    return f"{sight.parameter} {how}{written(sight.smallest, for_axis(sight.unit, axis), 2, printed=printed)}"
+
+
+def holding(sight: Sight, axis: str) -> str:
+    """Return at which other parameters that holds, as the page has it: ``period 0.5 mm``."""
+    known = entry(sight.name)
+    units = {p.name: for_axis(p.unit, axis) for p in known.parameters} if known is not None else {}
+    return ", ".join(f"{k} {written(v, units.get(k, ''), 2, printed=True)}" for k, v in sight.beside.items())
 
 
 def percent(share: float) -> str:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Place, Retuned, Value
+from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Place, Retuned, Sight, Value
 from rtcomp.stage.stage import Stage
 
 STAGE = {
@@ -74,6 +74,11 @@ def missing(rows: int = 30_000) -> Diagnosis:
         stage=Stage.from_dict(STAGE),
         next_experiment=Experiment(REFERENCE, ("drive-offset", "constant-force"), 20.0,
                                    "the same stretch at speeds a hundred times apart"),
+        sights=[
+            Sight("cogging", "amplitude", "N", 0.012, 0.2, {"period": 2.5e-4}),
+            Sight("inertia", "mass", "kg", 0.03, 2.0, {}),
+            Sight("frictional-lag", "time_constant", "s", math.inf, 0.05, {}),
+        ],
         candidates=[
             Candidate("cogging", 0.83, 41.0, True, 0.012),
             Candidate("torque-ripple", 0.41, 12.2, True, 0.04, "mostly what cogging explains"),

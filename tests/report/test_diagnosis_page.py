@@ -98,7 +98,14 @@ def test_nothing_missing_says_so_without_empty_sections() -> None:
     assert page.tone == "good" and math.isnan(share_explained(found))
     headings = [s.heading for s in page.sections]
     assert not any(h.startswith(("Named", "Where", "Retuned", "The next")) for h in headings)
-    assert "What could not be seen" in headings
+    assert "What could not be seen in this recording" in headings
+    (would,) = [s for s in page.sections if s.heading == "The smallest that would have been seen"]
+    assert would.table is not None
+    assert [row[:2] for row in would.table.rows] == [
+        ("cogging", "amplitude 12 mN"),
+        ("inertia", "mass by 30 g"),
+    ]
+    assert "cogging amplitude 12 mN" in diagnosis_text(found, "out")
 
 
 def test_what_no_entry_explains_is_not_shown_as_named() -> None:
@@ -241,6 +248,8 @@ def test_every_key_of_the_answer_stands_in_the_formats() -> None:
     answer = made_up.missing(500).to_json()
     for effect in answer["effects"]:
         effect["parameters"] = list(effect["parameters"].values())  # their names are the catalogue's
+    for size in answer["smallest_seen"]:
+        size["at"] = list(size["at"].values())
     assert keys(answer) - known == set()
     assert {"consistent", "retuned", "missing-physics", "unexplained"} <= known
 

@@ -1,0 +1,102 @@
+"""What is said to be the smallest that a recording would have shown, held against recordings that have it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from recorded import RATE, run, stage, there_and_back
+
+from rtcomp.diagnosis.base import Fitted, fit_base
+from rtcomp.diagnosis.decide import ABOVE_FLOOR
+from rtcomp.diagnosis.motion import Motion, prepare
+from rtcomp.diagnosis.result import Sight
+from rtcomp.diagnosis.sight import sight
+from rtcomp.kernels import Floats
+from rtcomp.physics import catalogue
+
+FLOOR = 0.005
+"""Of the force; well above what these recordings leave by themselves."""
+
+
+def floor_of(fitted: Fitted) -> Floats:
+    return np.asarray(FLOOR**2 * fitted.system.blocks.power[fitted.ledger.seen])
+
+
+def looked_at(reference: Floats) -> tuple[Motion, Fitted]:
+    motion = prepare(stage(), [run(stage(), reference)])
+    return motion, fit_base(stage(), motion)
+
+
+@pytest.fixture(scope="module")
+def clean() -> tuple[Motion, Fitted]:
+    return looked_at(there_and_back(12.0))
+
+
+@pytest.fixture(scope="module")
+def sights(clean: tuple[Motion, Fitted]) -> dict[str, Sight]:
+    motion, base = clean
+    return {s.name: s for s in sight(motion, base, [], floor_of(base))}
+
+
+def stands_out(clean: tuple[Motion, Fitted], entry: dict[str, Any]) -> bool:
+    """Whether what a recording with that effect leaves of the refitted belief is looked at at all."""
+    floor = floor_of(clean[1])
+    motion = prepare(stage(), [run(stage(effects=[entry]), there_and_back(12.0))], clean[0].cut)
+    return bool(fit_base(stage(), motion).errors.sum() > ABOVE_FLOOR * floor.sum())
+
+
+@pytest.mark.parametrize("name", [
+    "cogging", "drive-deadband", "position-dependent-friction", "parallel-spring", "asymmetric-friction",
+    "torque-ripple", "drive-offset", "tonal-disturbance",
+])  # fmt: skip
+def test_what_is_larger_stands_out_and_what_is_smaller_does_not(
+    clean: tuple[Motion, Fitted], sights: dict[str, Sight], name: str
+) -> None:
+    s = sights[name]
+    assert s.seen
+    entry = {"name": name, **s.beside}
+    assert stands_out(clean, {**entry, s.parameter: 2.5 * s.smallest})
+    assert not stands_out(clean, {**entry, s.parameter: 0.3 * s.smallest})
+
+
+def test_what_scales_everything_or_has_no_room_is_never_seen(sights: dict[str, Sight]) -> None:
+    assert not sights["sensor-scale"].seen and math.isinf(sights["sensor-scale"].smallest)
+
+
+def test_mass_shows_in_fast_motion_and_not_in_slow() -> None:
+    t = np.arange(int(12 * RATE)) / RATE
+    fade = np.clip(t / 0.5, 0.0, 1.0)
+    slow = fade * 2e-4 * np.sin(2 * np.pi * 0.5 * t)
+    fast = fade * (2e-4 * np.sin(2 * np.pi * 0.5 * t) + 2e-4 * np.sin(2 * np.pi * 9.0 * t))
+    found = []
+    for reference in (slow, fast):
+        motion, base = looked_at(reference)
+        (inertia,) = [s for s in sight(motion, base, [], floor_of(base)) if s.name == "inertia"]
+        found.append(inertia)
+    assert not found[0].seen
+    assert found[1].seen and found[1].smallest < 0.2
+
+
+def test_a_lower_floor_shows_smaller_ones(clean: tuple[Motion, Fitted], sights: dict[str, Sight]) -> None:
+    motion, base = clean
+    for s in sight(motion, base, [], 0.25 * floor_of(base)):
+        assert s.smallest <= 1.2 * sights[s.name].smallest
+        if s.name in ("cogging", "drive-offset", "position-dependent-friction"):
+            assert s.smallest == pytest.approx(0.5 * sights[s.name].smallest, rel=0.2)
+
+
+def test_sizes_are_parameters_of_the_catalogue(sights: dict[str, Sight]) -> None:
+    for s in sights.values():
+        parameters = {p.name: p for p in catalogue.entry(s.name).parameters}
+        assert parameters[s.parameter].unit == s.unit
+        assert set(s.beside) <= set(parameters) and s.parameter not in s.beside
+        assert s.smallest > 0.0 and s.most > 0.0
+
+
+def test_every_entry_that_a_motion_could_show_is_asked_for(sights: dict[str, Sight]) -> None:
+    models = {"dahl", "gms", "leuven", "lugre", "maxwell-slip", "modified-leuven", "micro-damping"}
+    shapes = {"position-force", "sensor-noise", "sensor-resolution", "drive-force"}
+    assert {e.name for e in catalogue.entries()} - models - shapes == set(sights)
