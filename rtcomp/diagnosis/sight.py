@@ -59,17 +59,22 @@ def sight(motion: Motion, final: Fitted, entries: Sequence[Entry], floor: Floats
 def _smallest(one: Typical, probe: _Probe, level: float) -> float:
     """Return the size from which on the base leaves a force of `level` (N rms) of an entry."""
     size, most = abs(one.probe), 2.0 * one.most * abs(one.probe)
+    hidden, shown = 0.0, float(np.inf)
     for _ in range(TRIES):
         try:
-            shows = probe.shows({**one.entry, one.size: one.neutral + float(np.copysign(size, one.probe))})
+            found = probe.shows({**one.entry, one.size: one.neutral + float(np.copysign(size, one.probe))})
         except (ConfigError, np.linalg.LinAlgError):
+            return shown
+        if 0.85 * level < found < 1.15 * level:
+            return size * level / found
+        if size >= most and found < level:
             return float(np.inf)
-        if 0.85 * level < shows < 1.15 * level:
-            return size * level / shows
-        if size >= most and shows < level:
-            return float(np.inf)
-        size = min(size * float(np.clip(level / max(shows, 1e-300), 0.05, 5.0)), most)
-    return size
+        hidden, shown = (size, shown) if found < level else (hidden, size)
+        if hidden > 0.0 and np.isfinite(shown):
+            size = float(np.sqrt(hidden * shown))
+        else:
+            size = min(size * float(np.clip(level / max(found, 1e-300), 0.05, 5.0)), most)
+    return shown
 
 
 class _Probe:
