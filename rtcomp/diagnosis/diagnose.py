@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rtcomp.diagnosis.base import Fitted, fit_base
+from rtcomp.diagnosis.curves import curves
 from rtcomp.diagnosis.decide import ABOVE_FLOOR, Choice, Decision, decide
 from rtcomp.diagnosis.experiment import next_experiment
 from rtcomp.diagnosis.extend import extended_stage, level_and_reach
@@ -101,7 +102,7 @@ def diagnose(
         fit = Fit(fit.before, fit.retuned, fit.before, fit.floor)
     say(0.4, "locate")
     where = locate(motion, base.residual, final.residual if named else None, seed, stage.axis)
-    effects = _effects(decision, named, base, final, least)
+    effects = _effects(decision, named, base, final, least, motion)
     retuned = _retuned(stage, final, extended)
     verdict = _verdict(effects, final, floor, least, fit)
     if verdict == "consistent":
@@ -155,7 +156,7 @@ def _held_out(stage: Stage, motion: Motion) -> float:
 
 
 def _effects(
-    decision: Decision, named: list[Entry], base: Fitted, final: Fitted, floor: Floats
+    decision: Decision, named: list[Entry], base: Fitted, final: Fitted, floor: Floats, motion: Motion
 ) -> list[Named]:
     if not named:
         return []
@@ -163,6 +164,7 @@ def _effects(
     spans = intervals(decision.refined)
     found = []
     names = [str(e["name"]) for e in decision.refined.entries]
+    drawn = curves(motion, final, decision.refined.entries, final.ledger.stage.axis)
     for entry, choice in zip(named, decision.choices, strict=True):
         at = names.index(str(entry["name"]))
         values = {}
@@ -172,7 +174,8 @@ def _effects(
                 low, high = spans.get((at, parameter.name), (float(value), float(value)))
                 values[parameter.name] = Value(float(value), low, high, parameter.unit)
         share = float(np.clip(choice.gain / excess, 0.0, 1.0))
-        found.append(Named(tuple(choice.names), choice.probability, values, share, _experiment_of(choice)))
+        told = _experiment_of(choice)
+        found.append(Named(tuple(choice.names), choice.probability, values, share, told, drawn[at]))
     found.sort(key=lambda e: -e.share)
     left = float(final.errors.sum() - floor.sum()) / excess
     if left > 0.2 and float(final.errors.sum()) > 2.0 * ABOVE_FLOOR * float(floor.sum()):

@@ -1,0 +1,109 @@
+"""The curve of a named effect over what was recorded, along the axis that it follows most."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rtcomp.diagnosis.base import Fitted
+from rtcomp.diagnosis.candidates import effect_of
+from rtcomp.diagnosis.locate import Axis, axes_of
+from rtcomp.diagnosis.motion import Motion
+from rtcomp.diagnosis.scene import Entry
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats
+
+BINS = 120
+"""Points of a curve."""
+WAVES = 8
+"""Periods of a wave that are drawn, of more in the stroke."""
+
+
+class Curve(NamedTuple):
+    """To draw: axis, its unit, bin centres (B,), residual force without the effect (N), its force (N)."""
+
+    axis: str
+    unit: str
+    x: Floats
+    data: Floats
+    curve: Floats
+
+
+def curves(motion: Motion, final: Fitted, entries: Sequence[Entry], axis: str) -> list[Curve | None]:
+    """Return the curve of each of `entries` beside the others of `final`; None where it has no force.
+
+    The force of an entry is what `final`, its numbers as they are, leaves without it and not with it. `axis`
+    is ``linear`` or ``rotary``.
+    """
+    looked = axes_of(motion, axis)
+    rest = final.residual
+    found: list[Curve | None] = []
+    for at, entry in enumerate(entries):
+        others = [effect_of(e) for i, e in enumerate(entries) if i != at]
+        try:
+            system = final.ledger.system(others)
+        except (ConfigError, np.linalg.LinAlgError):
+            found.append(None)
+            continue
+        without = system.y - system.columns @ final.coefficients[: system.columns.shape[1]]
+        force = without - rest
+        if not np.isfinite(force).all() or not np.any(force):
+            found.append(None)
+            continue
+        found.append(_along(looked, force, without, entry.get("period")))
+    return found
+
+
+def _along(looked: Sequence[Axis], force: Floats, without: Floats, period: object) -> Curve:
+    """Draw along the axis in whose bins most of the force is, a wave along the stroke."""
+    if isinstance(period, int | float):
+        looked = looked[:2]  # position, and position with the sign of the motion
+        tables = [_binned(a, _wave_edges(a.values, float(period)), force, without) for a in looked]
+    else:
+        tables = [_binned(a, _edges(a), force, without) for a in looked]
+    best = max(range(len(looked)), key=lambda i: _explained(tables[i], force))
+    return _curve(looked[best], tables[best])
+
+
+class _Table(NamedTuple):
+    centres: Floats
+    rows: Floats
+    data: Floats
+    curve: Floats
+
+
+def _edges(axis: Axis) -> Floats:
+    if axis.name == "direction":
+        return np.array([-1.5, -0.5, 0.5, 1.5])
+    edges = np.unique(np.quantile(axis.values, np.linspace(0.0, 1.0, BINS // 2 + 1)))
+    return edges if edges.size > 1 else np.array([edges[0] - 0.5, edges[0] + 0.5])
+
+
+def _wave_edges(x: Floats, period: float) -> Floats:
+    low, high = float(x.min()), float(x.max())
+    begin = max(low, min(float(np.median(x)) - WAVES / 2 * period, high - WAVES * period))
+    return np.linspace(begin, min(high, begin + WAVES * period), BINS + 1)
+
+
+def _binned(axis: Axis, edges: Floats, force: Floats, without: Floats) -> _Table:
+    inside = (axis.values >= edges[0]) & (axis.values <= edges[-1])
+    sign = np.ones(force.size) if axis.odd is None else axis.odd
+    at = np.clip(np.searchsorted(edges, axis.values[inside], side="right") - 1, 0, edges.size - 2)
+    count = np.bincount(at, minlength=edges.size - 1).astype(np.float64)
+
+    def mean(rows: Floats) -> Floats:
+        total = np.bincount(at, weights=(rows * sign)[inside], minlength=edges.size - 1)
+        return np.asarray(total / np.maximum(count, 1.0))
+
+    return _Table(0.5 * (edges[1:] + edges[:-1]), count, mean(without), mean(force))
+
+
+def _explained(table: _Table, force: Floats) -> float:
+    return float(np.sum(table.rows * table.curve**2) / table.rows.sum()) / float(np.mean(force**2))
+
+
+def _curve(axis: Axis, table: _Table) -> Curve:
+    kept = table.rows > 0
+    return Curve(axis.name, axis.unit, table.centres[kept], table.data[kept], table.curve[kept])
