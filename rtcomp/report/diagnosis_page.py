@@ -23,6 +23,7 @@ from rtcomp.report.diagnosis_words import (
     joined,
     next_command,
     percent,
+    printed,
     probability,
     sentence,
     share_explained,
@@ -82,7 +83,7 @@ def diagnosed_page(found: Diagnosis, recordings: Sequence[str], stage: str, out:
     force, unit = for_axis("N", axis), for_axis("m", axis)
     best = max(found.where, key=lambda place: place.share, default=None)
     where = (
-        [sentence(f"It shows against {best.axis}: {best.says}")]
+        [sentence(printed(best.says))]
         if best is not None and best.says and found.verdict != "consistent"
         else []
     )
@@ -174,16 +175,15 @@ def _unexplained(found: Diagnosis, force: str) -> list[Section]:
 
 
 def _place(place: Place, force: str) -> Section:
-    sure = f"p {'<' if place.p_value < 1e-3 else '='} {max(place.p_value, 1e-3):.2g}"
-    prose = (
-        f"{sentence(place.says)} {percent(place.share)} of the mismatch depends on {place.axis} ({sure}, all "
-        "axes looked at together)."
-    )
+    sign = "<" if place.p_value < 1e-3 else "="
+    sure = f"p {sign} {max(place.p_value, 1e-3):.2g}, all axes looked at together"
+    says = place.says or f"{percent(place.share)} of the mismatch depends on {place.axis}"
+    prose = sentence(f"{printed(says)} ({sure})")
     figure = place_figure(
         place.axis, place.unit, place.x, place.before, after=place.after, spread=place.spread,
         region=place.region, force_unit=force,
     )  # fmt: skip
-    return Section(f"Where: against {place.axis}", prose.strip(), figure)
+    return Section(f"Where: against {place.axis}", prose, figure)
 
 
 def _in_time(found: Diagnosis, force: str) -> list[Section]:
@@ -213,8 +213,8 @@ def _retuned(found: Diagnosis) -> list[Section]:
 
 
 def _candidates(found: Diagnosis) -> list[Section]:
-    if not found.candidates:
-        return []
+    if not any(math.isfinite(k.z) for k in found.candidates):
+        return []  # within the noise nothing was tried
     named = {effect.names[0] for effect in found.effects}
     tied = {name for effect in found.effects for name in effect.names[1:]}
     bars = [Bar(k.name, k.gain, k.name in named, k.observable) for k in found.candidates[:SHOWN]]
@@ -226,16 +226,20 @@ def _candidates(found: Diagnosis) -> list[Section]:
     rows, muted = [], []
     for index, k in enumerate(found.candidates):
         told = "named" if k.name in named else "cannot be told apart" if k.name in tied else ""
-        gain = percent(max(k.gain, 0.0)) if k.observable else ""
+        gain = _gained(max(k.gain, 0.0)) if k.observable else ""
         z = f"{k.z:.1f}" if k.observable and math.isfinite(k.z) else ""
         said = "; ".join(filter(None, [told, "" if k.observable else "cannot be seen", k.note]))
-        rows.append((k.name, gain, z, smallest(k), said))
+        rows.append((k.name, gain, z, smallest(k) if k.observable else "", said))
         if not k.observable:
             muted.append(index)
     table = Columns(
         ("Effect", "Would gain", "Over its error", "Would be seen from", "Remark"), rows, (1, 2, 3), muted
     )
     return [Section("Candidates", says, candidates_figure(bars), table)]
+
+
+def _gained(share: float) -> str:
+    return percent(share) if share > 0.01 or share <= 0.0 else f"{100 * share:.1f} %"
 
 
 def _not_seen(found: Diagnosis) -> list[Section]:

@@ -18,7 +18,7 @@ from rtcomp.diagnosis.result import Diagnosis, Named, Place, Value
 from rtcomp.report.columns import Columns, render_columns
 from rtcomp.report.diagnosis_page import diagnosed_page
 from rtcomp.report.diagnosis_text import diagnosis_text
-from rtcomp.report.diagnosis_words import share_explained, within
+from rtcomp.report.diagnosis_words import printed, share_explained, within
 from rtcomp.report.figures.candidates import Bar, candidates_figure, fit_figure
 from rtcomp.report.figures.residual import named_figure, place_figure, residual_figure
 from rtcomp.report.page import Page, Section, render_page, write_page
@@ -45,7 +45,7 @@ def test_the_verdict_comes_first_and_the_four_errors_after_it() -> None:
     found = made_up.missing()
     page = page_of(found)
     assert page.verdict[0] == found.sentence()
-    assert "position, period 0.611 mm" in page.verdict[1]
+    assert "Position, period 0.611 mm" in page.verdict[1]
     assert [row.value for row in page.summary[:4]] == pytest.approx([13.1, 12.8, 0.93, 0.81])
     assert page.notes == found.notes
     assert "mass: 2.11" in page.configuration and "cogging" in page.configuration
@@ -274,3 +274,20 @@ def test_every_figure_is_drawn_in_a_browser(make: type, tmp_path: Path, dark: bo
     count = sum(1 for s in page.sections if s.figure is not None)
     assert root is not None and f'data-plots="{count}"' in root[0] and 'data-errors="0"' in root[0]
     assert "CONSOLE" not in run.stderr
+
+
+@pytest.mark.parametrize(("said", "shown"), [
+    ("period 99.7 um, both directions", "period 99.7 µm, both directions"),
+    ("between -47.2 and 57.3 mm/s^2", "between -47.2 and 57.3 mm/s²"),
+    ("a tone at 17 Hz", "a tone at 17 Hz"),
+    ("58 % of the mismatch", "58 % of the mismatch"),
+])  # fmt: skip
+def test_places_are_typeset_on_the_page(said: str, shown: str) -> None:
+    assert printed(said) == shown
+
+
+def test_within_the_noise_there_is_no_table_of_candidates_that_nobody_tried() -> None:
+    found = made_up.consistent()
+    untried = [replace(k, z=math.nan, observable=False) for k in found.candidates]
+    headings = [s.heading for s in page_of(replace(found, candidates=untried)).sections]
+    assert "Candidates" not in headings and "What could not be seen in this recording" in headings

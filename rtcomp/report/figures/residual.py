@@ -141,7 +141,8 @@ def residual_figure(
             _shade(figure, t[begin] * in_time.factor, t[end - 1] * in_time.factor)
     kept = peak_indices([first, second], points)
     c.line(figure, t[kept] * in_time.factor, first[kept] * up.factor, BEFORE, palette.WITHOUT, width=1.2)
-    c.line(figure, t[kept] * in_time.factor, second[kept] * up.factor, AFTER, palette.WITH, width=1.2)
+    if not np.array_equal(first, second, equal_nan=True):
+        c.line(figure, t[kept] * in_time.factor, second[kept] * up.factor, AFTER, palette.WITH, width=1.2)
     figure.update_layout(hovermode="closest")
     c.note_thinned(figure, len(kept), len(t))
     if starts.size:
