@@ -63,13 +63,20 @@ def fit_figure(errors: Mapping[str, float], floor: float) -> go.Figure:
         unified=False,
     )  # fmt: skip
     colours = [palette.WITHOUT, palette.MEASURED, palette.WITH]
+    largest = 100 * max([*errors.values(), floor])
     for (name, error), colour in zip(errors.items(), colours, strict=False):
+        # A figure that the line would cross stands behind it.
+        crossed = 0.0 <= 100 * (floor - error) < 0.09 * largest
         figure.add_bar(
             x=[100 * error], y=[c.safe(name)], orientation="h", marker={"color": colour}, showlegend=False,
-            text=si(100 * error, "%"), textposition="outside", cliponaxis=False,
+            text=si(100 * error, "%"), textposition="none" if crossed else "outside", cliponaxis=False,
             hovertemplate="%{text}<extra></extra>",
         )  # fmt: skip
-    largest = 100 * max([*errors.values(), floor])
+        if crossed:
+            figure.add_annotation(
+                x=100 * floor, y=c.safe(name), xanchor="left", xshift=3, showarrow=False,
+                text=si(100 * error, "%"), font={"color": palette.INK, "size": 12},
+            )  # fmt: skip
     figure.add_shape(
         type="line", x0=100 * floor, x1=100 * floor, yref="paper", y0=0, y1=1,
         line={"color": palette.INK, "width": 1, "dash": "dash"},
