@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rtcomp.diagnosis.stretches import LEAST_ROWS, stretches
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect
 from rtcomp.physics.maxwell_slip import MaxwellSlip
@@ -106,13 +107,14 @@ def prepare(stage: Stage, recordings: Sequence[Recording], cut: float | None = N
     """Bring recordings of one rate to a workable size: windows of long ones, averages of fast ones."""
     rate = recordings[0].rate_hz
     reach = longest_reach(stage.friction)
+    wholes = [s for r in recordings for s in _stretches(r, reach)]
     if cut is None:
-        cut = _bandwidth(stage, [s for r in recordings for s in _windows(r, SAMPLE, 0.0)], rate)
+        cut = _bandwidth(stage, [s for w in wholes for s in _windows(w, SAMPLE, 0.0)], rate)
     factor = max(1, int(rate / (OVERSAMPLED * cut)))
-    if sum(len(r) for r in recordings) <= factor * MOST_ROWS:
-        strips = [_whole(r, reach) for r in recordings]
+    if sum(s.time.size for s in wholes) <= factor * MOST_ROWS:
+        strips = wholes
     else:
-        strips = [s for r in recordings for s in _windows(r, factor * WINDOW_ROWS // len(recordings), reach)]
+        strips = [s for w in wholes for s in _windows(w, factor * WINDOW_ROWS // len(wholes), reach)]
     coarse = _coarse(stage, strips)
     if coarse:
         strips = [replace(s, position=unstepped(s.position, cut, rate)) for s in strips]
@@ -132,19 +134,27 @@ def unstepped(position: Floats, cut: float, rate: float) -> Floats:
     return zero_phase(position, min(2.0 * cut, 0.4 * rate), rate)
 
 
-def _whole(recording: Recording, reach: float) -> Strip:
+def _stretches(recording: Recording, reach: float) -> list[Strip]:
+    """Return what is between a recording's long gaps, each with the lead that wipes out what was before."""
     position = bridged(recording.position, recording.trusted)
-    strip = Strip(recording.time - recording.time[0], position, recording.voltage, recording.reference)
-    begin = position[: int(LEAD * position.size) + 1]
-    washed = np.maximum.accumulate(begin) - np.minimum.accumulate(begin) >= WASHED * reach
-    first = int(np.argmax(washed))
-    late = not washed[first]
-    return replace(strip, lead=0 if late else first)
+    whole = Strip(recording.time - recording.time[0], position, recording.voltage, recording.reference)
+    found = []
+    for rows in stretches(recording.trusted):
+        strip = whole if rows.stop - rows.start == position.size else _part(whole, rows)
+        share = LEAD if rows.start == 0 else 1.0
+        begin = strip.position[: int(share * strip.position.size) + 1]
+        washed = np.maximum.accumulate(begin) - np.minimum.accumulate(begin) >= WASHED * reach
+        first = int(np.argmax(washed))
+        if washed[first]:
+            found.append(replace(strip, lead=first))
+        elif rows.start == 0:
+            found.append(strip)
+    longest = max((s.time.size - s.lead for s in found), default=0)
+    return [s for s in found if s.time.size - s.lead >= min(LEAST_ROWS, longest)] or [whole]
 
 
-def _windows(recording: Recording, rows: int, reach: float) -> list[Strip]:
+def _windows(whole: Strip, rows: int, reach: float) -> list[Strip]:
     """Return windows of so many rows, each with the lead that wipes out what friction remembers."""
-    whole = _whole(recording, reach)
     if whole.time.size <= WINDOWS * rows:
         return [whole]
     found = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -64,6 +65,16 @@ UNUSABLE: list[tuple[str, Callable[[Columns], Columns], list[str]]] = [
     ("mV", times("voltage", 1e3), ["voltage is 1e3 times too large (in mV rather than V?)"]),
     ("um", times("position", 1e6), ["position is 1e6 times too large (in um rather than m?)"]),
     ("sign", times("voltage", -1.0), ["voltage has the wrong sign"]),
+    ("turned round", times("position", -1.0), ["position has the wrong sign"]),
+    ("clipped sensor", lambda c: {**c, "position": np.clip(c["position"], -1e-5, 1e-5)},
+     ["position is clipped", "check the sensor's range"]),
+    *((f"{name} x {factor:g}", times(name, factor),
+       [f"{name} is {size} times too {'small' if factor < 1 else 'large'}", "multiply it by"])
+      for name, factor, size in (("position", 1e-3, "1e3"), ("position", 1e-6, "1e6"),
+                                 ("voltage", 1e-3, "1e3"), ("voltage", 1e-6, "1e6"),
+                                 ("voltage", 1e6, "1e6"))),
+    ("both", lambda c: {**c, "position": 1e3 * c["position"], "voltage": 1e3 * c["voltage"]},
+     ["position and voltage are both 1e3 times too large"]),
     ("gaps", jumped, ["time jumps by"]),
     ("NaN", lambda c: {**c, "voltage": np.where(c["time"] > 2, np.nan, c["voltage"])}, ["voltage is NaN"]),
     ("no voltage", lambda c: {k: v for k, v in c.items() if k != "voltage"},
@@ -80,8 +91,6 @@ def test_unusable_recordings_are_refused(
 
 
 def test_an_axis_of_another_kind_is_refused(recorded: Columns, folder: Path) -> None:
-    import json
-
     write(folder / "log.h5", recorded)
     rotary = yaml.safe_load(CONFIG)["stage"] | {"axis": "rotary"}
     with h5py.File(folder / "log.h5", "r+") as file:
@@ -129,3 +138,47 @@ def test_results_that_stand_there_are_not_overwritten_unasked(recorded: Columns,
     before = listing(folder)
     line = refused("diagnose", "log.csv", "--stage", "stage.yaml", "--out", "out", at=folder)
     assert "--force" in line and listing(folder) == before
+
+
+def dropped(c: Columns) -> Columns:
+    gone = np.sort(np.random.default_rng(1).choice(len(c["time"]) - 2, 200, replace=False)) + 1
+    return {k: np.delete(v, gone) for k, v in c.items()}
+
+
+def shaken(c: Columns) -> Columns:
+    return {**c, "time": c["time"] + 5e-5 * np.random.default_rng(1).uniform(size=len(c["time"]))}
+
+
+DOUBTFUL: list[tuple[str, Callable[[Columns], Columns], list[str]]] = [
+    ("a gap", lambda c: {k: np.delete(v, slice(1500, 1800)) for k, v in c.items()},
+     ["1 gap, longest 0.301 s", "300 rows bridged"]),
+    ("rows twice", lambda c: {k: np.repeat(v, 2) for k, v in c.items()}, ["of a time already seen"]),
+    ("rows missing", dropped, ["resampled from uneven rows"]),
+    ("jitter", shaken, ["time stamps jitter by"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "says"), [d[1:] for d in DOUBTFUL], ids=[d[0] for d in DOUBTFUL])
+def test_doubtful_rows_are_said_and_not_taken_for_physics(
+    recorded: Columns, folder: Path, change: Callable[[Columns], Columns], says: list[str]
+) -> None:
+    write(folder / "log.csv", change(dict(recorded)))
+    run = rtcomp(*diagnose("log.csv"), at=folder)
+    assert (run.returncode, run.stderr) == (0, "")
+    answer = json.loads(run.stdout)
+    assert answer["verdict"] == "consistent"
+    notes = " ".join(answer["notes"])
+    assert all(words in notes for words in says), notes
+
+
+def test_what_could_not_be_seen_is_said(recorded: Columns, folder: Path) -> None:
+    write(folder / "log.csv", recorded)
+    run = rtcomp("diagnose", "log.csv", "--stage", "stage.yaml", "--out", "out", "--force", at=folder)
+    assert run.returncode == 0, run.stderr
+    answer = json.loads((folder / "out" / "diagnosis.json").read_text())
+    seen = {size["name"]: size for size in answer["smallest_seen"]}
+    assert "sensor-scale" in answer["not_observable"] and not set(seen) & set(answer["not_observable"])
+    assert seen["cogging"]["parameter"] == "amplitude" and 0.0 < seen["cogging"]["value"] < 0.5
+    text = " ".join(run.stdout.split())
+    assert "in this motion:" in text and "sensor-scale" in text and "cogging amplitude" in text
+    assert "What could not be seen in this recording" in (folder / "out" / "report.html").read_text()
