@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rtcomp.diagnosis import excitation
+from rtcomp.diagnosis.stretches import LEAST_ROWS, stretches
 from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.kernels import Floats
 from rtcomp.recording.reader import Recording
@@ -52,6 +53,7 @@ def admit(stage: Stage, recordings: Sequence[Recording]) -> list[str]:
     for recording in recordings:
         _same_axis(stage, recording)
     _can_be_simulated(stage, recordings[0].rate_hz)
+    _whole_enough(recordings)
     notes = [_named(note, r, recordings) for r in recordings for note in _fits(stage, r)]
     notes += excitation.check(recordings)
     for r in recordings:
@@ -95,6 +97,21 @@ def _long_enough(recordings: Sequence[Recording]) -> None:
         raise RecordingError(
             f"{what} too short for a diagnosis: {rows} rows, {seconds:.3g} s; at least {needed:.3g} s at "
             f"{recordings[0].rate_hz:g} Hz are needed, {GOOD_SECONDS:g} s with ten reversals are good"
+        )
+
+
+def _whole_enough(recordings: Sequence[Recording]) -> None:
+    """Raise RecordingError where gaps leave stretches that are too short, or too little of them."""
+    first = recordings[0]
+    least = max(MIN_ROWS, int(MIN_SECONDS * first.rate_hz))
+    left = sum(rows.stop - rows.start for r in recordings for rows in stretches(r.trusted))
+    if left < least and not all(r.trusted.all() for r in recordings):
+        holes = sum(int(np.count_nonzero(np.diff(r.trusted.astype(np.int8)) < 0)) for r in recordings)
+        what = f"{first.path}: gaps cut it" if len(recordings) == 1 else "gaps cut the recordings"
+        raise RecordingError(
+            f"{what} into stretches too short for a diagnosis: {holes} gaps or outliers leave "
+            f"{left / first.rate_hz:.3g} s in stretches of {LEAST_ROWS / first.rate_hz:.3g} s or more, "
+            f"{least / first.rate_hz:.3g} s are needed; record it again"
         )
 
 

@@ -150,7 +150,7 @@ def _stretches(recording: Recording, reach: float) -> list[Strip]:
         elif rows.start == 0:
             found.append(strip)
     longest = max((s.time.size - s.lead for s in found), default=0)
-    return [s for s in found if s.time.size - s.lead >= min(LEAST_ROWS, longest)] or [whole]
+    return [s for s in found if s.time.size - s.lead >= min(LEAST_ROWS // 2, longest)] or [whole]
 
 
 def _windows(whole: Strip, rows: int, reach: float) -> list[Strip]:

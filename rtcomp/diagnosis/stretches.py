@@ -16,8 +16,7 @@ MOST = 12
 def stretches(trusted: npt.NDArray[np.bool_]) -> list[slice]:
     """Return the stretches of rows, in order, between runs of more than BRIDGED rows that are not `trusted`.
 
-    Doubtful rows at either end of a stretch are left out. Of many stretches the longest are returned, of
-    those that are too short none; all rows where nothing else is left.
+    Of many stretches the longest are returned, of those that are too short none.
     """
     if trusted.all():
         return [slice(0, trusted.size)]
@@ -28,4 +27,4 @@ def stretches(trusted: npt.NDArray[np.bool_]) -> list[slice]:
     stops = np.concatenate([begins[long], [trusted.size]])
     found = [(int(a), int(b)) for a, b in zip(starts, stops, strict=True) if b - a >= LEAST_ROWS]
     found = sorted(sorted(found, key=lambda ab: ab[0] - ab[1])[:MOST])
-    return [slice(a, b) for a, b in found] or [slice(0, trusted.size)]
+    return [slice(a, b) for a, b in found]

@@ -76,6 +76,8 @@ UNUSABLE: list[tuple[str, Callable[[Columns], Columns], list[str]]] = [
     ("both", lambda c: {**c, "position": 1e3 * c["position"], "voltage": 1e3 * c["voltage"]},
      ["position and voltage are both 1e3 times too large"]),
     ("gaps", jumped, ["time jumps by"]),
+    ("gaps all over", lambda c: {k: v[np.arange(len(v)) % 120 >= 20] for k, v in c.items()},
+     ["gaps cut it into stretches too short", "2 s are needed"]),
     ("NaN", lambda c: {**c, "voltage": np.where(c["time"] > 2, np.nan, c["voltage"])}, ["voltage is NaN"]),
     ("no voltage", lambda c: {k: v for k, v in c.items() if k != "voltage"},
      ["no column 'voltage'", "--map"]),

@@ -22,9 +22,7 @@ def test_stretches_hold_no_long_gap_and_are_as_long_as_can_be(
 ) -> None:
     trusted = np.concatenate([np.repeat([good_first, not good_first], run) for run in runs])
     found = stretches(trusted)
-    assert 1 <= len(found) <= MOST
-    if found == [slice(0, trusted.size)]:
-        return
+    assert len(found) <= MOST
     for rows in found:
         assert rows.stop - rows.start >= LEAST_ROWS
         assert trusted[rows.start] or rows.start == 0
