@@ -1,13 +1,19 @@
-"""Diagnoses on recordings with known answers, and on the measured EMPS; how long one takes.
+"""Diagnoses on recordings with known answers, and on the measured EMPS; how long one takes, and how much.
 
     python tools/bench_diagnosis.py DATA --json diagnosis.json
 
-DATA holds `sealed-dev` (cases with answers.json) and `real/emps/DATA_EMPS.mat`; what is not there is skipped.
+Time and memory are those of the installed command, from the start of its process: until the place of the
+mismatch stands on the terminal, and until the end. `--hour` adds an hour at 10 kHz, which takes some minutes
+and 2 GB of disk. DATA holds `sealed-dev` (cases with answers.json) and `real/emps/DATA_EMPS.mat`; what is not
+there is skipped.
 """
 
 from __future__ import annotations
 
 import json
+import shutil
+import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -15,6 +21,7 @@ from typing import Any
 import click
 import numpy as np
 from figures_table import Figure, show
+from on_terminal import Shown, on_terminal
 
 from rtcomp.diagnosis.diagnose import diagnose
 from rtcomp.diagnosis.result import Diagnosis
@@ -22,8 +29,10 @@ from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
 from rtcomp.jobs.replay import replay
 from rtcomp.jobs.simulate import closed_loop
-from rtcomp.recording.reader import Recording, read
+from rtcomp.recording.reader import read
+from rtcomp.recording.writer import write_csv
 from rtcomp.stage.stage import Stage
+from rtcomp.yamlfile import dump_yaml
 
 EMPS = {"time": "t", "reference": "qg", "position": "qm", "voltage": "vir"}
 RETUNINGS = {
@@ -86,27 +95,88 @@ def emps(path: Path) -> list[Figure]:
     ]
 
 
-def pace(seconds: float) -> list[Figure]:
-    """So long at 1 kHz of the simulated stage with cogging that the belief lacks."""
+def hidden(rate: float, seconds: float) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Return the shipped stage at `rate`, and a recording of it with cogging that it lacks."""
     config = Configuration.load(shipped("leuven.yaml"))
-    believed = config.stage
-    hidden = believed.with_changes(stage={"effects": [{"name": "cogging", "amplitude": 0.4, "period": 1e-4}]})
+    belief = {**config.stage.to_dict(), "rate": rate}
+    cogging = config.stage.with_changes(
+        stage={"effects": [{"name": "cogging", "amplitude": 0.4, "period": 1e-4}]}
+    )
     motion = {**config.file.data["compensate"]["reference"], "duration": seconds}
-    run = closed_loop(config.changed(**hidden.to_dict(), reference=motion))
-    columns = {k: run.columns[k] for k in ("time", "reference", "position", "voltage")}
-    began = time.perf_counter()
-    done = diagnose(believed, [Recording(columns, run.rate_hz)])
-    taken = time.perf_counter() - began
-    named = ", ".join(" or ".join(e.names) for e in done.effects)
-    return [Figure(f"{seconds:g} s at 1 kHz: seconds", taken, "s", f"<= {seconds:g}", named)]
+    run = closed_loop(config.changed(**{**cogging.to_dict(), "rate": rate}, reference=motion))
+    return belief, {k: run.columns[k] for k in ("time", "reference", "position", "voltage")}
+
+
+def command(folder: Path, recording: str, belief: dict[str, Any]) -> Shown:
+    dump_yaml(folder / "stage.yaml", belief)
+    rtcomp = str(Path(sys.executable).parent / "rtcomp")
+    return on_terminal(
+        [rtcomp, "diagnose", str(folder / recording), "--stage", str(folder / "stage.yaml"),
+         "--out", str(folder / "out")],
+        "Where ", "Missing: ",
+    )  # fmt: skip
+
+
+def pace(seconds: float, folder: Path) -> list[Figure]:
+    """So long at 1 kHz of the simulated stage with cogging that the belief lacks, as CSV."""
+    belief, columns = hidden(1000.0, seconds)
+    write_csv(folder / "run.csv", columns, True)
+    command(folder, "run.csv", belief)  # kernels compiled, once for all
+    shutil.rmtree(folder / "out")
+    shown = command(folder, "run.csv", belief)
+    named = shown.text[shown.text.index("Missing: ") :].split("\r")[0]
+    what = f"{seconds:g} s at 1 kHz"
+    return [
+        Figure(
+            f"{what}: where, on the terminal after",
+            shown.when["Where "],
+            "s",
+            "<= 2",
+            "process start included",
+        ),
+        Figure(f"{what}: everything", shown.seconds, "s", "<= 60", named),
+    ]
+
+
+def hour(folder: Path, rate: float = 1e4, stretch: float = 60.0, times: int = 60) -> list[Figure]:
+    """An hour: a minute of steady motion over and over, with fresh noise, as HDF5."""
+    import h5py
+
+    settling = 10.0  # a whole period of the motion, as `stretch` is
+    belief, columns = hidden(rate, settling + stretch)
+    rows = int(stretch * rate)
+    chance = np.random.default_rng(1)
+    with h5py.File(folder / "hour.h5", "w") as file:
+        for name, column in columns.items():
+            file.create_dataset(name, (times * rows,), dtype="f8")
+            for k in range(times):
+                part = column[-rows:].copy()
+                if name == "time":
+                    part = (k * rows + np.arange(rows)) / rate
+                elif name == "position":
+                    part += 5e-9 * chance.standard_normal(rows)
+                file[name][k * rows : (k + 1) * rows] = part
+    shown = command(folder, "hour.h5", belief)
+    named = shown.text[shown.text.index("Missing: ") :].split("\r")[0]
+    what = f"{times * stretch / 3600:g} h at {rate / 1000:g} kHz"
+    return [
+        Figure(f"{what}: memory", shown.peak_bytes / 1e9, "GB", "<= 4", f"{times * rows} rows"),
+        Figure(f"{what}: where, on the terminal after", shown.when["Where "], "s"),
+        Figure(f"{what}: everything", shown.seconds, "s", "", named),
+    ]
 
 
 @click.command()
 @click.argument("data", required=False, type=click.Path(path_type=Path))
 @click.option("--seconds", default=60.0, show_default=True, help="Of the simulated recording.")
+@click.option("--hour", "long", is_flag=True, help="An hour at 10 kHz too: some minutes, 2 GB of disk.")
 @click.option("--json", "path", type=click.Path(path_type=Path))
-def main(data: Path | None, seconds: float, path: Path | None) -> None:
-    figures = pace(seconds)
+def main(data: Path | None, seconds: float, long: bool, path: Path | None) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        figures = pace(seconds, Path(folder))
+    if long:
+        with tempfile.TemporaryDirectory() as folder:
+            figures += hour(Path(folder))
     if data is not None and (data / "real/emps/DATA_EMPS.mat").is_file():
         figures += emps(data / "real/emps/DATA_EMPS.mat")
     if data is not None and (data / "sealed-dev/answers.json").is_file():

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from rtcomp.diagnosis.bank import units_along
 from rtcomp.diagnosis.blocks import Blocks
@@ -274,6 +273,8 @@ def true_position(effects: Sequence[Effect], time: Floats, measured: Floats) -> 
     rows[:, STEP] = np.gradient(time)
     for effect in sensors:
         if effect.inverse is None:
+            from scipy.interpolate import CubicSpline
+
             late = float(effect.values.get("delay", 0.0))
             rows[:, SENSED] = CubicSpline(time, rows[:, SENSED])(np.minimum(time + late, time[-1]))
             continue
