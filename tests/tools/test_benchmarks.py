@@ -100,8 +100,11 @@ def test_speed(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_diagnosis_without_recordings_to_judge(tmp_path: Path) -> None:
-    found = figures(tmp_path, "bench_diagnosis.py", "--seconds", 15)
-    assert "cogging" in found["15 s at 1 kHz: seconds"]["note"]
+    found = figures(tmp_path, "bench_diagnosis.py", "--seconds", 15, "--minutes", 3)
+    assert "cogging" in found["15 s at 1 kHz: everything"]["note"]
+    assert found["15 s at 1 kHz: where, on the terminal after"]["value"] < 10.0
+    # Four columns of a float64, twice over, and what the program is by itself.
+    assert found["3 min at 10 kHz: memory"]["value"] < 0.8
 
 
 @pytest.mark.slow
