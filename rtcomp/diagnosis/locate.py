@@ -19,7 +19,7 @@ from rtcomp.units import for_axis, prefixed
 BINS = 24
 SHIFTS = 199
 ROWS = 8_000
-"""Rows that are looked at, of more evenly spread ones: places need no more."""
+"""Rows on which chance is reckoned, of more evenly spread ones."""
 PIECES = 4 * BINS
 """Pieces that are put in another order where the axis is time itself."""
 LEAST_SHARE = 0.05
@@ -132,11 +132,10 @@ def locate(
 
     `axis` is ``linear`` or ``rotary``, for the units.
     """
-    step = -(-before.size // ROWS)
-    every = slice(None, None, step)
-    looked = [Binned.of(_thinned(a, every)) for a in axes_of(motion, axis)]
+    every = slice(None, None, -(-before.size // ROWS))
+    axes = axes_of(motion, axis)
+    looked = [Binned.of(_thinned(a, every)) for a in axes]
     few = before[every]
-    later = None if after is None else after[every]
     random = np.random.default_rng(seed)
     shifts = random.integers(few.size // 20, few.size - few.size // 20, SHIFTS)
     shares = np.array([b.share(few) for b in looked])
@@ -148,11 +147,17 @@ def locate(
     excess = (shares - null.mean(axis=0)) / (null.std(axis=0) + 1e-12)
     best = ((null - null.mean(axis=0)) / (null.std(axis=0) + 1e-12)).max(axis=1)
     found = []
-    for binned, share, z in zip(looked, shares, excess, strict=True):
+    for one, z in zip(axes, excess, strict=True):
         p = (1.0 + float(np.count_nonzero(best >= z))) / (SHIFTS + 1.0)
-        if share > LEAST_SHARE and p <= 0.05:
-            found.append(_place(binned, share, p, few, later))
-    found = _with_period(found, looked[1].axis, looked[2].axis.values, few, later, shifts)
+        if p > 0.05:
+            continue
+        whole = Binned.of(one)
+        share = whole.share(before)
+        if share > LEAST_SHARE:
+            found.append(_place(whole, share, p, before, after))
+    found = _with_period(
+        found, looked[1].axis, looked[2].axis.values, few, None if after is None else after[every], shifts
+    )
     line = _line(motion, before, after)
     # What depends on the motion has the motion's own tones; a tone of its own depends on nothing else.
     if line is not None and line.share > max((p.share for p in found if p.axis != "time"), default=0.0):
