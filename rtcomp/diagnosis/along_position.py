@@ -15,6 +15,8 @@ FINEST = CELLS // 8
 """Periods in the stroke, at the most."""
 COARSEST = 2.5
 """Periods in the stroke, at the least: below, it is a slope or a bend."""
+STEADY = 0.4
+"""Part of its amplitude that a wave has in either half of the rows along the stroke."""
 _FINER = 4
 """Trial periods between one whole number of them in the stroke and the next."""
 
@@ -51,7 +53,8 @@ def wave(x: Floats, direction: Floats, speed: Floats, residual: Floats, shifts: 
     """Return the wave along `x` (m) that most of `residual` (N) follows; all (n,), `direction` -1, 0 or 1.
 
     Its significance is that of the strongest wave of all after the residual was shifted in a circle by each
-    of `shifts` rows. None where the stroke is nothing.
+    of `shifts` rows. None where the stroke is nothing, or no wave
+    goes all along it.
     """
     low, span = float(x.min()), float(np.ptp(x))
     if not span > 0.0:
@@ -75,14 +78,18 @@ def wave(x: Floats, direction: Floats, speed: Floats, residual: Floats, shifts: 
     count = (first + int(np.argmax(chosen))) / _FINER
     trials = [_fitted(x, signed, span / c) for c in count + np.linspace(-0.5, 0.5, 41) / _FINER * 2]
     explained, period, coefficients = max(trials)
-    slow = np.abs(speed) <= np.median(np.abs(speed))
-    basis = coefficients[0] * np.cos(2 * np.pi * x / period) + coefficients[1] * np.sin(
-        2 * np.pi * x / period
-    )
+    angle = 2 * np.pi * x / period
+    basis = coefficients[0] * np.cos(angle) + coefficients[1] * np.sin(angle)
     size = float(np.hypot(*coefficients))
-    halves = [size * float(signed[h] @ basis[h]) / max(float(basis[h] @ basis[h]), 1e-300)
-              for h in (slow, ~slow)]  # fmt: skip
-    return Wave(period, is_odd, min(explained / power, 1.0), p, *halves)
+
+    def among(rows: np.ndarray) -> float:
+        return size * float(signed[rows] @ basis[rows]) / max(float(basis[rows] @ basis[rows]), 1e-300)
+
+    left = x <= np.median(x)
+    if min(among(left), among(~left)) < STEADY * size:
+        return None  # a bump here and there, not a wave
+    slow = np.abs(speed) <= np.median(np.abs(speed))
+    return Wave(period, is_odd, min(explained / power, 1.0), p, among(slow), among(~slow))
 
 
 def _fitted(x: Floats, y: Floats, period: float) -> tuple[float, float, tuple[float, float]]:

@@ -11,6 +11,7 @@ from rtcomp.diagnosis.base import Fitted
 from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.locate import Axis, axes_of
 from rtcomp.diagnosis.motion import Motion
+from rtcomp.diagnosis.result import Place
 from rtcomp.diagnosis.scene import Entry
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
@@ -54,6 +55,19 @@ def curves(motion: Motion, final: Fitted, entries: Sequence[Entry], axis: str) -
             continue
         found.append(_along(looked, force, without, entry.get("period")))
     return found
+
+
+def left_over(places: Sequence[Place]) -> Curve | None:
+    """Return the curve of what no entry explains: its means along the place where most of it shows, smoothed.
+
+    `places` are those of the residual that is left, the strongest first; None where it has none.
+    """
+    place = next((p for p in places if p.axis != "frequency" and p.x.size > 2), None)
+    if place is None:
+        return None
+    wide = np.concatenate([place.before[:1], place.before, place.before[-1:]])
+    smooth = np.convolve(wide, [0.25, 0.5, 0.25], mode="valid")
+    return Curve(place.axis, place.unit, place.x, place.before, smooth)
 
 
 def _along(looked: Sequence[Axis], force: Floats, without: Floats, period: object) -> Curve:

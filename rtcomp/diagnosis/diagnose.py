@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from rtcomp.diagnosis.base import Fitted, fit_base
-from rtcomp.diagnosis.curves import curves
+from rtcomp.diagnosis.curves import curves, left_over
 from rtcomp.diagnosis.decide import ABOVE_FLOOR, Choice, Decision, decide
 from rtcomp.diagnosis.experiment import next_experiment
 from rtcomp.diagnosis.extend import extended_stage, level_and_reach
@@ -109,6 +110,9 @@ def diagnose(
         where = []
     elif verdict == "unexplained" and not effects:
         effects = [Named(("unexplained",), 1.0, {}, 1.0)]
+    if any(e.names == ("unexplained",) for e in effects):
+        drawn = left_over(locate(motion, final.residual, None, seed, stage.axis))
+        effects = [replace(e, curve=drawn) if e.names == ("unexplained",) else e for e in effects]
     say(0.6, "locate")
     sights = sight(motion, final, entries_found if final is not base else [], least)
     seen_here = {name for effect in effects for name in effect.names}

@@ -24,6 +24,8 @@ PIECES = 4 * BINS
 """Pieces that are put in another order where the axis is time itself."""
 LEAST_SHARE = 0.05
 """Part of the mismatch below which an axis is not mentioned."""
+FEW, PLAIN = 6, 0.4
+"""Waves in the stroke, below which one must be this part of the mismatch to pass for one."""
 AS_MUCH = 0.8
 """Part of what depends on position at all, from which on a period in it is said instead."""
 
@@ -190,6 +192,8 @@ def _with_period(
     at = wave(x, direction, speed, before, shifts)
     if at is None or at.share < LEAST_SHARE or at.p_value > 0.05:
         return found
+    if at.share < PLAIN and np.ptp(x) < FEW * at.period:
+        return found  # the turning points of the motion make as much
     plain = max((p.share for p in found if p.axis == "position"), default=0.0)
     if at.share < AS_MUCH * plain:
         return found

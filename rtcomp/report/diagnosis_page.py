@@ -166,10 +166,14 @@ def _unexplained(found: Diagnosis, force: str) -> list[Section]:
         if effect.curve is not None:
             axis, unit, x, data, curve = effect.curve
             figure = named_figure(axis, unit, x, data, curve, name="smooth curve", force_unit=force)
-        prose = (
-            f"No entry of the catalogue explains {percent(effect.share)} of the mismatch. The curve serves "
-            "as a provisional correction where it was recorded, and says nothing beyond."
-        )
+        prose = f"No entry of the catalogue explains {percent(effect.share)} of the mismatch."
+        if figure is not None:
+            prose += (
+                " It shows most against what is drawn. The curve serves as a provisional correction where it "
+                "was recorded, and says nothing beyond."
+            )
+        else:
+            prose += " It shows along none of the axes that are looked at."
         sections.append(Section("Something that no entry explains", prose, figure))
     return sections
 

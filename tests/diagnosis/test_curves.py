@@ -10,8 +10,9 @@ from recorded import run, stage, there_and_back
 
 from rtcomp.diagnosis.base import Fitted, fit_base
 from rtcomp.diagnosis.candidates import effect_of
-from rtcomp.diagnosis.curves import Curve, curves
+from rtcomp.diagnosis.curves import Curve, curves, left_over
 from rtcomp.diagnosis.motion import Motion, prepare
+from rtcomp.diagnosis.result import Place
 
 COGGING = {"name": "cogging", "amplitude": 0.4, "period": 1e-4, "phase": 0.5}
 DEADBAND = {"name": "drive-deadband", "width": 0.2}
@@ -57,3 +58,13 @@ def test_an_effect_that_does_nothing_has_no_curve() -> None:
     motion, base = fitted([COGGING])
     nothing = {**COGGING, "amplitude": 0.0}
     assert curves(motion, base, [COGGING, nothing], "linear")[1] is None
+
+
+def test_what_no_entry_explains_is_drawn_along_its_strongest_place() -> None:
+    x = np.linspace(-1.0, 1.0, 24)
+    tone = Place("frequency", "Hz", (1.0, 2.0), 0.9, 0.005, "", x, x)
+    bump = Place("position", "m", (-1.0, 1.0), 0.5, 0.005, "", x, np.exp(-10 * x**2))
+    curve = left_over([tone, bump])
+    assert curve is not None and curve.axis == "position"
+    assert curve.curve == pytest.approx(curve.data, abs=0.06)
+    assert left_over([tone]) is None and left_over([]) is None

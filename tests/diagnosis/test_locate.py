@@ -71,6 +71,13 @@ def test_a_slope_along_the_stroke_is_no_wave(motion: Motion) -> None:
     assert place.axis == "position" and "period" not in place.says
 
 
+def test_a_bump_on_one_side_is_no_wave(motion: Motion) -> None:
+    x = kept(motion, "position")
+    high = np.quantile(x, 0.8)
+    place = first(motion, np.where(x > high, np.sin(2 * np.pi * (x - high) / 1e-4), 0.0))
+    assert place.axis == "position" and "period" not in place.says
+
+
 def test_a_tone_is_found_whatever_the_motion(motion: Motion) -> None:
     rate = motion.rate / motion.thinning
     count = kept(motion, "time").size
