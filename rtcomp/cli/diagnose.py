@@ -60,11 +60,13 @@ def diagnose(
 
     from rtcomp.diagnosis.admit import admit
     from rtcomp.recording.acted import as_acted
+    from rtcomp.recording.driven import driven
     from rtcomp.recording.reader import read
     from rtcomp.stage.stage import Stage
 
     stage = Stage.load(stage_file)
-    data = [as_acted(read(path, mapping, rate_hz=rate, only=COLUMNS)) for path in recordings]
+    read_ones = [as_acted(read(path, mapping, rate_hz=rate, only=COLUMNS)) for path in recordings]
+    data = [part for one in read_ones for part in driven(one)]
     several = len(data) > 1
     notes = [f"in {r.path.name}: {note}" if several else note for r in data for note in r.notes]
     notes += admit(stage, data)
