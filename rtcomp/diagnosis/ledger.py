@@ -125,6 +125,8 @@ class Ledger:
         before: list[Effect] = []
         if any(e.name == "load-dependent-friction" for e in modifiers):
             before = [*self._drive(), *drive]
+            if any(e.values.get("external") for e in modifiers):
+                before += others
         paths = self._kinematics(sensors)
         sides, masses = [], []
         for strip, (x, v, a) in zip(self.motion.strips, paths, strict=True):

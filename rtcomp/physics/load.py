@@ -5,14 +5,14 @@ from __future__ import annotations
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.wires import DRIVE, GRIP_LEVEL, REACH
+from rtcomp.physics.wires import DRIVE, GRIP_LEVEL, PUSH, REACH
 
 
 @effect_kernel
 def load_dependent_friction(p: Floats, s: Floats, w: Floats) -> None:
-    """p: coefficient (1)."""
+    """p: coefficient (1), external (1)."""
     if w[GRIP_LEVEL] > 0.0:
-        w[REACH] *= 1.0 + p[0] * abs(w[DRIVE]) / w[GRIP_LEVEL]
+        w[REACH] *= 1.0 + abs(p[0] * w[DRIVE] - p[1] * w[PUSH]) / w[GRIP_LEVEL]
 
 
 @register
@@ -21,19 +21,23 @@ class LoadDependentFriction(Effect):
 
     The load is the size of the drive's force, which carries weight and inertia as well. The sliding level
     grows by `coefficient` times it, at equal stiffness: while everything sticks a changing load changes no
-    force, and elements beyond a falling level slip back to it. It needs a friction model in the stage; the
-    level, where it falls with speed, is that of the step before.
+    force, and elements beyond a falling level slip back to it. A gear is loaded from its other side too:
+    weight and springs, which hold against the drive, add `external` times theirs. It needs a friction model
+    in the stage; the level, where it falls with speed, is that of the step before.
     """
 
     name = "load-dependent-friction"
     place = Place.FRICTION
-    parameters = (Parameter("coefficient", "1", 0.0, 10.0, "friction force over transmitted force"),)
+    parameters = (
+        Parameter("coefficient", "1", 0.0, 10.0, "friction force over the force of the drive"),
+        Parameter("external", "1", 0.0, 10.0, "the same over weight, springs and other forces", 0.0),
+    )
     kernel = load_dependent_friction
     says = "friction grows with the force that the drive transmits, as in gears and screws"
-    equation = "level <- level + coefficient |F_drive|"
+    equation = "level <- level + |coefficient F_drive - external F_push|"
     source = "Duclusaud, Passault, Padois, Ly (2024), arXiv 2410.08650, load-dependent friction"
     signature = "residual force with the sign of motion whose size is in proportion to the command's"
     experiment = "the same stroke at several loads, or accelerating and coasting"
     example = {"coefficient": 0.05}
-    neutral = {"coefficient": 0.0}
+    neutral = {"coefficient": 0.0, "external": 0.0}
     order = 20

@@ -70,7 +70,7 @@ VOCABULARY = {
         "asymmetric-viscous-friction": "ratio (1)",
         "stribeck": "rise (1), velocity (m/s)",
         "position-dependent-friction": "amplitude (1), period (m), phase (rad), slope (1/m)",
-        "load-dependent-friction": "coefficient (1)",
+        "load-dependent-friction": "coefficient (1), external (1)",
         "non-congruent-friction": "softening (1)",
         "frictional-lag": "time_constant (s)",
         "stiction-ageing": "growth (1), distance (m)",

@@ -170,6 +170,16 @@ def test_the_level_grows_by_the_load_and_the_force_at_rest_does_not_follow_it(na
     assert np.ptp(f[-200:]) < 1e-6
 
 
+def test_a_gear_is_loaded_from_its_other_side_too():
+    model = at_one_level("maxwell-slip")
+    x = np.linspace(0, 4e-4, 40_001)
+    plain = force(x, model=model)[-1]
+    both = effect("load-dependent-friction", coefficient=0.05, external=0.1)
+    weight = effect("gravity", force=-30.0)
+    assert force(x, weight, both, model=model, drive=20.0)[-1] == pytest.approx(plain + 4.0, rel=2e-3)
+    assert force(x, both, model=model, drive=20.0)[-1] == pytest.approx(plain + 1.0, rel=2e-3)
+
+
 # stiction-ageing
 
 
