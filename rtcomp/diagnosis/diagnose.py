@@ -31,6 +31,8 @@ from rtcomp.diagnosis.result import (
 )
 from rtcomp.diagnosis.scene import Entry
 from rtcomp.diagnosis.sight import sight
+from rtcomp.diagnosis.sticking import MUCH, mostly_hidden
+from rtcomp.diagnosis.told_by_position import told_by_position
 from rtcomp.errors import RtcompError
 from rtcomp.kernels import Floats
 from rtcomp.physics import catalogue
@@ -73,6 +75,9 @@ def diagnose(
     if located is not None:
         part = float(np.linalg.norm(base.residual) / max(float(np.linalg.norm(base.system.y)), 1e-300))
         located(part, locate(motion, base.residual, None, seed, stage.axis))
+    unseen_sticking = mostly_hidden(stage, recordings)
+    if unseen_sticking > MUCH:
+        return told_by_position(stage, recordings, motion, base, unseen_sticking, say, seed)
     floor = floor_errors(retuned_stage, base, motion, seed + 1)
     power = float(base.system.blocks.power[base.ledger.seen].sum())
     least = np.maximum(floor, NEGLIGIBLE**2 / ABOVE_FLOOR * base.system.blocks.power[base.ledger.seen])

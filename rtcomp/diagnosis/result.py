@@ -121,6 +121,31 @@ class Fit:
 
 
 @dataclass(frozen=True)
+class PositionFit:
+    """Mean absolute errors of position (m) of a stage let go at points of the recording, driven as it was.
+
+    On windows of `seconds` that neither fitting nor selection saw.
+    """
+
+    before: float
+    retuned: float
+    after: float
+    floor: float
+    """What the sensor alone would leave of any stage."""
+    seconds: float
+
+    def to_json(self) -> dict[str, float]:
+        """Return the errors as the contract writes them."""
+        return {
+            "before": self.before,
+            "retuned": self.retuned,
+            "after": self.after,
+            "floor": self.floor,
+            "seconds": self.seconds,
+        }
+
+
+@dataclass(frozen=True)
 class Candidate:
     """What one entry of the catalogue would have gained."""
 
@@ -206,6 +231,10 @@ class Diagnosis:
     """N, (K,): the same with the extended stage."""
     unseen: Floats = field(default_factory=lambda: np.zeros(0))
     """(K,), 1 where a row took no part in fitting or selection."""
+    position: PositionFit | None = None
+    """Where the balance of forces decides nothing: what was decided by instead."""
+    retuned_stage: Stage | None = None
+    """The believed physics with the values that fit best, where it was decided by position."""
 
     def sentence(self) -> str:
         """Return the verdict in one sentence."""
@@ -243,6 +272,8 @@ class Diagnosis:
             "smallest_seen": [s.to_json() for s in self.sights if s.seen],
             "notes": list(self.notes),
         }
+        if self.position is not None:
+            data["fit"]["position_error"] = self.position.to_json()
         if self.next_experiment is not None:
             data["next_experiment"] = {
                 "reference": "reference.yaml",

@@ -150,7 +150,7 @@ def _tone(s: Scene) -> list[Column]:
     lowest = max(10.0 * rate / rows, 1.0)  # slower, it is no tone but part of the motion's own band
     spectrum[(frequency < lowest) | (frequency > s.motion.cut * 1.2)] = 0.0
     # A line stands out of its neighbourhood, whatever the motion puts around it.
-    width = 201
+    width = min(201, spectrum.size)
     around = np.convolve(spectrum, np.ones(width) / width, mode="same") + 1e-300
     found = []
     ratio = np.where(spectrum > 0, spectrum / around, 0.0) * np.sqrt(spectrum)

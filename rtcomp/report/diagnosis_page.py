@@ -11,7 +11,7 @@ import numpy as np
 
 from rtcomp import __version__
 from rtcomp.control.references import Reference
-from rtcomp.diagnosis.result import Diagnosis, Experiment, Named, Place
+from rtcomp.diagnosis.result import Diagnosis, Experiment, Named, Place, PositionFit
 from rtcomp.report.columns import Columns
 from rtcomp.report.diagnosis_words import (
     UNEXPLAINED,
@@ -53,6 +53,8 @@ def diagnosed_rows(found: Diagnosis) -> list[Row]:
         Row("Force error, extended stage", 100 * fit.after, "%", _explained(found)),
         Row("Force error, noise alone", 100 * fit.floor, "%", "what the sensor leaves of any stage"),
     ]
+    if found.position is not None:
+        rows += _position_rows(found.position, for_axis("m", found.stage.axis))
     for effect in found.effects:
         rows.append(Row(title(effect), 100 * effect.share, "%", f"of the mismatch; {_sure(effect)}"))
     for moved in found.retuned:
@@ -68,6 +70,16 @@ def diagnosed_rows(found: Diagnosis) -> list[Row]:
         e = found.next_experiment
         rows.append(Row("Next experiment", e.seconds, "s", f"tells apart {joined(e.tells_apart, 'and')}"))
     return rows
+
+
+def _position_rows(fit: PositionFit, unit: str) -> list[Row]:
+    note = f"mean over {fit.seconds:.2g} s, let go at points not seen in fitting, driven as recorded"
+    return [
+        Row("Position error, as believed", fit.before, unit, note),
+        Row("Position error, retuned", fit.retuned, unit, "the same physics, other values"),
+        Row("Position error, extended stage", fit.after, unit, "what decided: the balance of forces cannot"),
+        Row("Position error, noise alone", fit.floor, unit, "what the sensor leaves of any stage"),
+    ]
 
 
 def _sure(effect: Named) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 
-from rtcomp.diagnosis.result import Diagnosis, Named, Place
+from rtcomp.diagnosis.result import Diagnosis, Named, Place, PositionFit
 from rtcomp.report.diagnosis_words import (
     UNEXPLAINED,
     from_size,
@@ -38,6 +38,8 @@ def diagnosis_text(found: Diagnosis, out: str) -> str:
         ],
     )
     lines += _block("Force error", [_fit(found)])
+    if found.position is not None:
+        lines += _block("Position", [_position_fit(found.position, found.stage.axis)])
     if found.not_observable:
         lines += _block("Not seen", [f"in this motion: {', '.join(found.not_observable)}"])
     if found.verdict in ("consistent", "retuned"):
@@ -85,6 +87,15 @@ def _fit(found: Diagnosis) -> str:
     share = share_explained(found)
     gain = f" {sentence(f'{percent(share)} of the mismatch is explained')}" if share == share else ""
     return f"{said}; noise alone {si(100 * fit.floor, '%')}; on parts not seen in fitting.{gain}"
+
+
+def _position_fit(fit: PositionFit, axis: str) -> str:
+    unit = for_axis("m", axis)
+    steps = [("as believed", fit.before), ("retuned", fit.retuned), ("extended", fit.after)]
+    said = ", ".join(f"{name} {si(error, unit)}" for name, error in steps)
+    return (
+        f"{said}; noise alone {si(fit.floor, unit)}; mean over {si(fit.seconds, 's')} from points not seen."
+    )
 
 
 def _block(label: str, entries: list[str]) -> list[str]:

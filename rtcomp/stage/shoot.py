@@ -43,19 +43,21 @@ def shoot(
     voltage: Floats,
     starts: np.ndarray,
     rows: int,
+    coarse: float = 1.0,
 ) -> Floats:
     """Return positions (m, (starts, rows)) simulated from each row of `starts` on, `rows` rows long.
 
     The recorded motion is `time` (s, equally spaced), true `position` (m), `velocity` (m/s) and `voltage` (V,
     held from row to row), each (K,). Every start must leave `rows` rows; the first position of each is the
-    recorded one. Sensors are left out.
+    recorded one. Sensors are left out. Steps are `coarse` times as long as in a simulation, where speed
+    counts for more than the last digits.
     """
     starts = np.sort(np.asarray(starts, dtype=np.int64))
     if rows < 1 or (starts.size and (starts[0] < 0 or starts[-1] + rows > time.size)):
         raise ValueError(f"windows of {rows} rows from {starts} do not lie within {time.size} rows")
     program = Program([e for e in stage.chain if e.place is not Place.SENSOR])
     period = float((time[-1] - time[0]) / max(time.size - 1, 1))
-    count = max(1, math.ceil(period / largest_step(stage) - 1e-9))
+    count = max(1, math.ceil(period / (coarse * largest_step(stage)) - 1e-9))
     base = np.array([stage.mass, stage.force_constant, largest_stiffness(stage), 0.0])
     motion = np.ascontiguousarray(np.column_stack([time, position, velocity, voltage]))
     out = np.empty((starts.size, rows))
