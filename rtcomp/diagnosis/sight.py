@@ -14,7 +14,7 @@ import numpy as np
 from rtcomp.diagnosis.base import Fitted
 from rtcomp.diagnosis.blocks import Blocks, Bounds
 from rtcomp.diagnosis.candidates import effect_of
-from rtcomp.diagnosis.ledger import MASS, VISCOUS, Ledger
+from rtcomp.diagnosis.ledger import BIAS, BIASES, MASS, VISCOUS, Ledger
 from rtcomp.diagnosis.motion import Motion, Strip
 from rtcomp.diagnosis.result import Sight
 from rtcomp.diagnosis.scene import Entry, Scene
@@ -32,7 +32,7 @@ TRIES = 8
 """Sizes that are tried of an entry: not all show in proportion to their size."""
 UNSEEABLE = ("sensor-scale",)
 """Entries that scale everything: friction, periods and mass of another size make up for them."""
-OWN = {"viscous-friction": VISCOUS, "back-emf": VISCOUS, "inertia": MASS}
+OWN = {"viscous-friction": VISCOUS, "back-emf": VISCOUS, "inertia": MASS, **dict.fromkeys(BIASES, BIAS)}
 """Entries that are a number of the base: found where it moves, so it is held while they are tried."""
 
 
@@ -49,8 +49,12 @@ def sight(motion: Motion, final: Fitted, entries: Sequence[Entry], floor: Floats
     reduced.weigh(ledger.weights)
     probe = _Probe(reduced, final, [effect_of(e) for e in entries])
     middle = few.strips[len(few.strips) // 2].time
+    # What is there already is not asked for again, but for waves, of which there may be several.
+    named = {str(e["name"]) for e in entries if "period" not in e}
     found = []
     for one in typical(Scene.of(motion, final), float(middle[middle.size // 2])):
+        if one.name in named:
+            continue
         smallest = float(np.inf) if one.name in UNSEEABLE else _smallest(one, probe, level)
         found.append(_sight(one, smallest))
     return found
@@ -95,7 +99,7 @@ class _Probe:
             return 0.0
         low, high = self._bounds.low.copy(), self._bounds.high.copy()
         own = OWN.get(str(entry["name"]))
-        if own is not None:
+        if own in at_work.names:
             at = at_work.names.index(own)
             low[at] = high[at] = self._known[at]
         one = Blocks.of(at_work.columns, target, self._rows, 1)

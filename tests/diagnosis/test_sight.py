@@ -10,6 +10,7 @@ import pytest
 from recorded import RATE, run, stage, there_and_back
 
 from rtcomp.diagnosis.base import Fitted, fit_base
+from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.decide import ABOVE_FLOOR
 from rtcomp.diagnosis.motion import Motion, prepare
 from rtcomp.diagnosis.result import Sight
@@ -100,3 +101,19 @@ def test_every_entry_that_a_motion_could_show_is_asked_for(sights: dict[str, Sig
     models = {"dahl", "gms", "leuven", "lugre", "maxwell-slip", "modified-leuven", "micro-damping"}
     shapes = {"position-force", "sensor-noise", "sensor-resolution", "drive-force"}
     assert {e.name for e in catalogue.entries()} - models - shapes == set(sights)
+
+
+def test_a_bias_that_the_belief_has_is_a_number_of_the_base_and_seen_all_the_same() -> None:
+    belief = stage(effects=[{"name": "drive-offset", "offset": 0.05}])
+    motion = prepare(belief, [run(belief, there_and_back(8.0))])
+    base = fit_base(belief, motion)
+    offset = next(s for s in sight(motion, base, [], floor_of(base)) if s.name == "drive-offset")
+    assert offset.seen
+
+
+def test_what_is_named_already_is_not_asked_for_again() -> None:
+    drag: dict[str, object] = {"name": "quadratic-drag", "coefficient": 1e4}
+    motion = prepare(stage(), [run(stage(effects=[drag]), there_and_back(8.0))])
+    fitted = fit_base(stage(), motion, [effect_of(drag)])
+    names = [s.name for s in sight(motion, fitted, [drag], floor_of(fitted))]
+    assert "quadratic-drag" not in names and "cogging" in names
