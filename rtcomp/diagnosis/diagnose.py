@@ -49,6 +49,9 @@ STRUCTURED = 0.3
 """Part of the remaining mismatch that depends on one axis, from which on names are taken back."""
 MODEL = 0.005
 """Relative half width of an interval that no amount of data removes: kernels and friction grid are models."""
+ROUGH = (0.75, 1.0, 1.3)
+"""Factors on the believed reaches with which the place of the mismatch is looked for at first."""
+
 Progress = Callable[[float, str], None]
 Located = Callable[[float, Sequence[Place]], None]
 """Told, before anything is named, what part of the force the refitted stage leaves open (rms), and where."""
@@ -69,12 +72,15 @@ def diagnose(
     say: Progress = progress or (lambda _part, _what: None)
     say(0.0, "balance")
     motion = prepare(stage, recordings)
+    if located is not None:
+        # Few reaches are enough to say where; all of them are tried for what is.
+        rough = fit_base(stage, motion, scales=ROUGH)
+        part = float(np.linalg.norm(rough.residual) / max(float(np.linalg.norm(rough.system.y)), 1e-300))
+        say(0.5, "balance")
+        located(part, locate(motion, rough.residual, None, seed, stage.axis))
     base = fit_base(stage, motion)
     retuned_stage = extended_stage(stage, base, [])
     say(1.0, "balance")
-    if located is not None:
-        part = float(np.linalg.norm(base.residual) / max(float(np.linalg.norm(base.system.y)), 1e-300))
-        located(part, locate(motion, base.residual, None, seed, stage.axis))
     unseen_sticking = mostly_hidden(stage, recordings)
     if unseen_sticking > MUCH:
         return told_by_position(stage, recordings, motion, base, unseen_sticking, say, seed)
