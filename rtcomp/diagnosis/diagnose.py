@@ -30,7 +30,7 @@ from rtcomp.diagnosis.result import (
     Verdict,
 )
 from rtcomp.diagnosis.scene import Entry
-from rtcomp.diagnosis.sight import sight
+from rtcomp.diagnosis.sight import pinned, sight
 from rtcomp.diagnosis.sticking import MUCH, mostly_hidden
 from rtcomp.diagnosis.told_by_position import told_by_position
 from rtcomp.errors import RtcompError
@@ -127,7 +127,7 @@ def diagnose(
     say(0.6, "locate")
     sights = sight(motion, final, entries_found if final is not base else [], least)
     seen_here = {name for effect in effects for name in effect.names}
-    retuned, flat = _pinned(retuned, sights)
+    retuned, flat = pinned(retuned, sights)
     say(0.8, "locate")
     experiment = None
     for choice in decision.choices:
@@ -273,24 +273,6 @@ def _retuned(believed: Stage, final: Fitted, extended: Stage) -> list[Retuned]:
                 Retuned(name, float(old), Value(float(new), float(new - half), float(new + half), unit))
             )
     return found
-
-
-BASE_OF = {"mass": "inertia", "viscous": "viscous-friction"}
-"""Parameters of the stage whose change is an entry of the catalogue."""
-
-
-def _pinned(retuned: list[Retuned], sights: Sequence[Sight]) -> tuple[list[Retuned], list[str]]:
-    """Return what moved by so much that this motion shows it, and a note for each that it leaves open."""
-    from_size = {s.name: s.smallest for s in sights}
-    flat = [
-        r
-        for r in retuned
-        if abs(r.after.value - r.before) < 0.5 * from_size.get(BASE_OF.get(r.parameter, ""), 0.0)
-    ]
-    notes = [
-        f"{r.parameter} is not pinned by this motion: the stage's is as good as any like it" for r in flat
-    ]
-    return [r for r in retuned if r not in flat], notes
 
 
 def _tell_apart(

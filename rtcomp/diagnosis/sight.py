@@ -16,7 +16,7 @@ from rtcomp.diagnosis.blocks import Blocks, Bounds
 from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.ledger import BIAS, BIASES, MASS, VISCOUS, Ledger
 from rtcomp.diagnosis.motion import Motion, Strip
-from rtcomp.diagnosis.result import Sight
+from rtcomp.diagnosis.result import Retuned, Sight
 from rtcomp.diagnosis.scene import Entry, Scene
 from rtcomp.diagnosis.typical import Typical, typical
 from rtcomp.errors import ConfigError
@@ -58,6 +58,24 @@ def sight(motion: Motion, final: Fitted, entries: Sequence[Entry], floor: Floats
         smallest = float(np.inf) if one.name in UNSEEABLE else _smallest(one, probe, level)
         found.append(_sight(one, smallest))
     return found
+
+
+BASE_OF = {"mass": "inertia", "viscous": "viscous-friction"}
+"""Parameters of the stage whose change is an entry of the catalogue."""
+
+
+def pinned(retuned: list[Retuned], sights: Sequence[Sight]) -> tuple[list[Retuned], list[str]]:
+    """Return what moved by so much that this motion shows it, and a note for each that it leaves open."""
+    from_size = {s.name: s.smallest for s in sights}
+    flat = [
+        r
+        for r in retuned
+        if abs(r.after.value - r.before) < 0.5 * from_size.get(BASE_OF.get(r.parameter, ""), 0.0)
+    ]
+    notes = [
+        f"{r.parameter} is not pinned by this motion: the stage's is as good as any like it" for r in flat
+    ]
+    return [r for r in retuned if r not in flat], notes
 
 
 def _smallest(one: Typical, probe: _Probe, level: float) -> float:

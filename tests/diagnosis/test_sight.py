@@ -13,8 +13,8 @@ from rtcomp.diagnosis.base import Fitted, fit_base
 from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.decide import ABOVE_FLOOR
 from rtcomp.diagnosis.motion import Motion, prepare
-from rtcomp.diagnosis.result import Sight
-from rtcomp.diagnosis.sight import sight
+from rtcomp.diagnosis.result import Retuned, Sight, Value
+from rtcomp.diagnosis.sight import pinned, sight
 from rtcomp.kernels import Floats
 from rtcomp.physics import catalogue
 
@@ -117,3 +117,17 @@ def test_what_is_named_already_is_not_asked_for_again() -> None:
     fitted = fit_base(stage(), motion, [effect_of(drag)])
     names = [s.name for s in sight(motion, fitted, [drag], floor_of(fitted))]
     assert "quadratic-drag" not in names and "cogging" in names
+
+
+def test_a_number_that_moved_less_than_would_show_is_not_reported() -> None:
+    def moved(name: str, value: float) -> Retuned:
+        return Retuned(name, 2.0, Value(value, 0.99 * value, 1.01 * value, "kg"))
+
+    sights = [
+        Sight("inertia", "mass", "kg", 1.0, 2.0, {}),
+        Sight("viscous-friction", "coefficient", "", 0.1, 1.0, {}),
+    ]
+    kept, notes = pinned([moved("mass", 1.7), moved("viscous", 2.3), moved("friction.level", 2.1)], sights)
+    assert [r.parameter for r in kept] == ["viscous", "friction.level"]
+    (note,) = notes
+    assert note.startswith("mass is not pinned")
