@@ -91,10 +91,16 @@ def held_out(folder: Path, believed: Stage, learn: tuple[int, ...], judge: int) 
     ):
         before, refitted, after = error(believed), error(retuned), error(done.stage)
         figures += [
-            Figure(f"... gain {judge}, {kind}: as believed", before, "mrad"),
-            Figure("... retuned", refitted, "mrad"),
-            Figure("... extended", after, "mrad"),
-            Figure("... retuned over extended", refitted / after, "1", "", "published: 1.5 to 2.9"),
+            Figure(f"gain {judge}, {kind}: as believed", before, "mrad"),
+            Figure(f"gain {judge}, {kind}: retuned", refitted, "mrad"),
+            Figure(f"gain {judge}, {kind}: extended", after, "mrad"),
+            Figure(
+                f"gain {judge}, {kind}: retuned over extended",
+                refitted / after,
+                "1",
+                "",
+                "published: 1.5 to 2.9",
+            ),
         ]
     return figures
 

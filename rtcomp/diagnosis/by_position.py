@@ -25,6 +25,8 @@ MOST = 3
 SHORTLIST = 5
 """Entries that are fitted from several starts and judged on windows left out."""
 FOLDS = 5
+WHOLE = 3
+"""Recordings from which on whole ones are left out."""
 QUICK = 6
 """Steps of the fits that draw the short list."""
 REFIT = 8
@@ -37,8 +39,10 @@ SETTLED = 0.02
 """Part of the first error above the floor up to which nothing more is looked for."""
 HARMLESS = 0.7
 """Part of the blocks in which it must do no harm."""
-ALIKE = 0.25
-"""Names are alike that differ by less than this part of what the best takes away, and no more than chance."""
+ALIKE = 0.1
+"""Names are alike that differ by less than this part of what the best takes away, and by chance."""
+EARNED = 0.05
+"""Part of what the best takes away that every further number of an entry must take, to come before another."""
 SKIPPED = ("position-force", "drive-gain", "inertia", "viscous-friction")
 """Entries that take any shape, or are numbers of the stage, which are turned anyway."""
 RELEASED = 0.3
@@ -147,7 +151,7 @@ class Judge:
         seen = np.array([k for k in range(BLOCKS) if k not in UNSEEN and np.any(windows.block == k)])
         self.blocks = seen
         # A motion of another kind is the harder test: of several recordings, whole ones are left out.
-        own = windows.recording if windows.recording.max(initial=0) + 1 >= FOLDS else windows.block
+        own = windows.recording if windows.recording.max(initial=0) + 1 >= WHOLE else windows.block
         groups = np.array_split(np.unique(own[windows.seen]), FOLDS)
         self.folds = [windows.seen & np.isin(own, group) for group in groups if group.size]
 
@@ -213,7 +217,7 @@ def _gain(base: Judged, other: Judged) -> tuple[float, float]:
 
 
 def _alike(before: Judged, tried: Sequence[Judged]) -> list[Judged]:
-    """Return what ends closest, and all that end as close: of those, what has fewest numbers first."""
+    """Return what ends closest, and all that end as close, likeliest first: numbers must earn their place."""
     if not tried:
         return []
     best = min(tried, key=lambda t: float(t.outside.sum()))
@@ -224,7 +228,8 @@ def _alike(before: Judged, tried: Sequence[Judged]) -> list[Judged]:
         scatter = float(worse.std(ddof=1) * np.sqrt(worse.size))
         if float(worse.sum()) <= min(ALIKE * reduction, 2.0 * scatter):
             alike.append(other)
-    return sorted(alike, key=lambda t: (len(t.setting.knobs()), float(t.outside.sum())))
+    cost = EARNED * reduction
+    return sorted(alike, key=lambda t: float(t.outside.sum()) + cost * len(t.setting.knobs()))
 
 
 def _step(before: Judged, alike: Sequence[Judged], tried: Sequence[Judged]) -> Step:
