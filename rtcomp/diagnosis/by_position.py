@@ -42,7 +42,7 @@ HARMLESS = 0.7
 ALIKE = 0.1
 """Names are alike that differ by less than this part of what the best takes away, and by chance."""
 EARNED = 0.05
-"""Part of what the best takes away that every further number of an entry must take, to come before another."""
+"""Part of what the best takes away that each further number of an entry must earn, to come first."""
 SKIPPED = ("position-force", "drive-gain", "inertia", "viscous-friction")
 """Entries that take any shape, or are numbers of the stage, which are turned anyway."""
 RELEASED = 0.3
