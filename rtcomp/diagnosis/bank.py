@@ -65,7 +65,7 @@ def units_along(
     ]
     models = units[-1].order
     chain = sorted(modifiers, key=lambda e: e.order)
-    before = [*sorted(drive, key=lambda e: e.order), *(e for e in chain if e.order < models)]
+    before = [*sorted(drive, key=lambda e: (e.place, e.order)), *(e for e in chain if e.order < models)]
     after = [e for e in chain if e.order > models]
     program = Program([*before, *units, *after])
     row = float((motion[-1, 0] - motion[0, 0]) / max(motion.shape[0] - 1, 1))

@@ -8,13 +8,13 @@ import numpy as np
 
 from rtcomp import physics
 from rtcomp.diagnosis.blocks import Bounds
-from rtcomp.diagnosis.ledger import BIASES, Ledger, System, grid_of
+from rtcomp.diagnosis.ledger import BIASES, WHOLE, Ledger, System, grid_of
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect
 from rtcomp.stage.stage import Stage
 
-BELIEVED = 0.15
+BELIEVED = 0.12
 """How far off mass, viscous friction and micro-damping may be before that is a finding of its own."""
 SCALES = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.12, 1.25, 1.4, 1.6, 1.8)
 """Factors tried on the reaches of the friction grid."""
@@ -83,12 +83,13 @@ def fit_base(
     known = [e for e in map(physics.build, stage.mechanics.effects) if e.place is not physics.Place.DRIVE]
     for scale in scales:
         ledger = Ledger(stage, motion, grid_of(stage, scale), known)
-        system = ledger.system()
-        bounds = bounds_of(stage, system.columns.shape[1], released=released)
-        for _ in range(2 if effects else 1):
+        # What asks for the whole of friction is given first the fit without it, then the one with it.
+        rounds = 3 if any(e.name in WHOLE for e in effects or ()) else 1
+        for i in range(rounds):
+            system = ledger.system((effects or []) if rounds == 1 or i else [])
+            bounds = bounds_of(stage, system.columns.shape[1], released=released)
             found = system.blocks.coefficients(ledger.seen, bounds)
             ledger.weigh(found[FIXED : FIXED + ledger.reaches.size])
-            system = ledger.system(effects or [])
         errors = system.blocks.left_out(ledger.seen, bounds)
         if best is None or errors.sum() < best.errors.sum():
             best = Fitted(ledger, system, bounds, errors, scale)

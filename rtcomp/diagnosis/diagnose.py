@@ -10,8 +10,9 @@ import numpy as np
 
 from rtcomp.diagnosis.base import Fitted, fit_base
 from rtcomp.diagnosis.curves import curves, left_over
-from rtcomp.diagnosis.decide import ABOVE_FLOOR, Choice, Decision, decide
+from rtcomp.diagnosis.decide import ABOVE_FLOOR, Choice, Decision
 from rtcomp.diagnosis.experiment import next_experiment
+from rtcomp.diagnosis.explain import explain
 from rtcomp.diagnosis.extend import extended_stage, level_and_reach
 from rtcomp.diagnosis.floor import floor_errors
 from rtcomp.diagnosis.locate import locate
@@ -38,15 +39,16 @@ from rtcomp.kernels import Floats
 from rtcomp.physics import catalogue
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.recording.reader import Recording
-from rtcomp.stage.balance import force_balance
 from rtcomp.stage.stage import Stage
 
-NEGLIGIBLE = 0.006
+AGREES = 0.006
 """Relative force error up to which a recording is held to agree, whatever its noise promises."""
+NEGLIGIBLE = 0.0035
+"""Relative force error up to which nothing is looked for."""
+OPEN = 4.0
+"""Squared error over the floor's, from which on something remains that no entry explains."""
 MOVED = 0.02
 """Relative change of a parameter that is worth reporting."""
-STRUCTURED = 0.3
-"""Part of the remaining mismatch that depends on one axis, from which on names are taken back."""
 MODEL = 0.005
 """Relative half width of an interval that no amount of data removes: kernels and friction grid are models."""
 ROUGH = (0.75, 1.0, 1.3)
@@ -85,30 +87,10 @@ def diagnose(
     if unseen_sticking > MUCH:
         return told_by_position(stage, recordings, motion, base, unseen_sticking, say, seed)
     floor = floor_errors(retuned_stage, base, motion, seed + 1)
-    power = float(base.system.blocks.power[base.ledger.seen].sum())
     least = np.maximum(floor, NEGLIGIBLE**2 / ABOVE_FLOOR * base.system.blocks.power[base.ledger.seen])
-    decision = decide(stage, motion, base, least, say)
-    final = decision.refined.fitted
-    if decision.choices:
-        # Names that leave a clear dependence on something are the nearest names, not the right ones.
-        left = locate(motion, final.residual, None, seed)
-        decision.abstain_if_poor(least, any(p.share > STRUCTURED for p in left))
-    entries_found = [dict(e) for e in decision.refined.entries] if decision.choices else []
-    if not decision.choices:
-        final = base
-    named, own, decision.choices = _fold(stage, final, entries_found, decision.choices)
-    extended = own if named or entries_found else retuned_stage
-    say(0.2, "judge")
-    fit = Fit(
-        _held_out(stage, motion),
-        _held_out(retuned_stage, motion),
-        _held_out(extended, motion),
-        float(np.sqrt(floor.sum() / power)),
-    )
-    if named and fit.after > 1.02 * min(fit.before, fit.retuned):
-        # What the ledger gains must hold in the stage itself; else it is not offered as an explanation.
-        named, decision.choices, extended, final = [], [], retuned_stage, base
-        fit = Fit(fit.before, fit.retuned, fit.retuned, fit.floor)
+    told = explain(stage, motion, base, floor, least, say, seed)
+    decision, named, final, fit = told.decision, told.named, told.final, told.fit
+    extended, entries_found = told.stage, told.entries
     if not named and fit.before <= fit.after:
         extended = stage
         fit = Fit(fit.before, fit.retuned, fit.before, fit.floor)
@@ -154,22 +136,6 @@ def diagnose(
     )
 
 
-def _held_out(stage: Stage, motion: Motion) -> float:
-    """Return the relative force error of a whole stage on what nothing was fitted to or chosen by."""
-    off = over = 0.0
-    block = motion.block()
-    start = 0
-    for strip in motion.strips:
-        balance = force_balance(stage, strip.time, strip.position, strip.voltage, motion.cut)
-        rows = motion.kept(strip)
-        drive, needed = balance.force_drive[rows], balance.force_motion[rows]
-        unseen = np.isin(block[start : start + drive.size], UNSEEN)
-        start += drive.size
-        off += float(np.sum((drive - needed)[unseen] ** 2))
-        over += float(np.sum(needed[unseen] ** 2))
-    return float(np.sqrt(off / over)) if over > 0 else 0.0
-
-
 def _effects(
     decision: Decision, named: list[Entry], base: Fitted, final: Fitted, floor: Floats, motion: Motion
 ) -> list[Named]:
@@ -193,7 +159,7 @@ def _effects(
         found.append(Named(tuple(choice.names), choice.probability, values, share, told, drawn[at]))
     found.sort(key=lambda e: -e.share)
     left = float(final.errors.sum() - floor.sum()) / excess
-    if left > 0.2 and float(final.errors.sum()) > 2.0 * ABOVE_FLOOR * float(floor.sum()):
+    if left > 0.2 and float(final.errors.sum()) > OPEN * float(floor.sum()):
         found.append(Named(("unexplained",), 1.0, {}, left))
     return found
 
@@ -208,36 +174,12 @@ def _verdict(effects: list[Named], final: Fitted, floor: Floats, least: Floats, 
     if effects:
         return "missing-physics"
     left = float(final.errors.sum())
-    if left > 1.5 * ABOVE_FLOOR * float(least.sum()):
+    power = float(final.system.blocks.power[final.ledger.seen].sum())
+    if left > max(OPEN * float(least.sum()), AGREES**2 * power):
         return "unexplained"
-    if fit.before > 1.25 * fit.after and fit.before > NEGLIGIBLE:
+    if fit.before > 1.25 * fit.after and fit.before > AGREES:
         return "retuned"
     return "consistent" if left < 100 * float(floor.sum()) else "unexplained"
-
-
-FOLDED = ("viscous-friction", "inertia")
-"""Entries that are numbers of the believed stage with other values: reported as retuned."""
-
-
-def _fold(
-    stage: Stage, final: Fitted, found: list[Entry], choices: list[Choice]
-) -> tuple[list[Entry], Stage, list[Choice]]:
-    """Put entries that only change a believed number into that number; return the others, and the stage."""
-    named, kept, changes = [], [], {}
-    plain = extended_stage(stage, final, [])
-    for entry, choice in zip(found, choices, strict=True):
-        name = str(entry["name"])
-        if name == "viscous-friction" and stage.mechanics.viscous > 0:
-            value = plain.mechanics.viscous + float(entry["coefficient"])  # type: ignore[arg-type]
-            changes["viscous"] = max(value, 0.0)
-        elif name == "inertia":
-            # The base's mass is refitted beside the entry, whose kernel replaces the believed one.
-            changes["mass"] = float(entry["mass"]) * plain.mass / stage.mass  # type: ignore[arg-type]
-        else:
-            named.append(entry)
-            kept.append(choice)
-    own = extended_stage(stage, final, named)
-    return named, own.with_changes(stage=changes) if changes else own, kept
 
 
 def _retuned(believed: Stage, final: Fitted, extended: Stage) -> list[Retuned]:

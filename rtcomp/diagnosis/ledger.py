@@ -18,12 +18,11 @@ import numpy as np
 from rtcomp.diagnosis.bank import units_along
 from rtcomp.diagnosis.blocks import Blocks
 from rtcomp.diagnosis.motion import BLOCKS, UNSEEN, Motion, Strip
-from rtcomp.kernels import Floats, call_effect, compiled
+from rtcomp.diagnosis.path import behind_play, derivatives, kinematics
+from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place
 from rtcomp.physics.coupled import LOAD_SHARE
 from rtcomp.physics.maxwell_slip import MaxwellSlip
-from rtcomp.physics.rows import new_rows
-from rtcomp.physics.wires import SENSED, STEP, TIME
 from rtcomp.stage.balance import around_rows, forces
 from rtcomp.stage.stage import Stage
 
@@ -108,7 +107,7 @@ class Ledger:
         """Return the force (N, kept rows) that the motion needs for `effect` alone: a column."""
         rows = []
         for strip in self.motion.strips:
-            x, v, a = kinematics(strip, self.motion.period, sensors)
+            x, v, a = kinematics(strip, self.motion, sensors)
             held = np.append(strip.voltage[:1], strip.voltage[:-1])
             f = forces(self.stage, [effect], strip.time, x, v, a, strip.voltage)
             g = forces(self.stage, [effect], strip.time, x, v, a, held) if effect.place is Place.DRIVE else f
@@ -152,7 +151,7 @@ class Ledger:
         """Return true position, velocity and acceleration of each strip; remembers the last ones."""
         key = _key(sensors)
         if self._paths[0] != key:
-            found = [kinematics(strip, self.motion.period, sensors) for strip in self.motion.strips]
+            found = [kinematics(strip, self.motion, sensors) for strip in self.motion.strips]
             self._paths = key, found
         return self._paths[1]
 
@@ -214,81 +213,6 @@ def believed_weights(stage: Stage, reaches: Floats) -> Floats:
     else:
         weights[:] = 1.0 / reaches.size
     return weights
-
-
-def kinematics(strip: Strip, period: float, effects: Sequence[Effect] = ()) -> tuple[Floats, Floats, Floats]:
-    """Return true position, velocity and acceleration (SI) behind a strip, sensor effects undone."""
-    x = true_position(effects, strip.time, strip.position)
-    return x, *derivatives(x, period)
-
-
-def derivatives(x: Floats, period: float) -> tuple[Floats, Floats]:
-    """Return first and second central differences of positions (m) in rows of `period` (s)."""
-    v, a = np.zeros_like(x), np.zeros_like(x)
-    v[1:-1] = (x[2:] - x[:-2]) / (2 * period)
-    a[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / period**2
-    return v, a
-
-
-@compiled
-def behind_play(x: Floats, gap: float, stiffness: Floats, reaches: Floats) -> Floats:
-    """Return the position (m) of a load with friction that `x` drives through a play of +-`gap` (m).
-
-    Slow motion: in contact the load goes along as long as its friction, of these elements, holds it
-    against the end; where friction has relaxed it stays behind until the other end meets it.
-    """
-    out = np.empty_like(x)
-    z = np.zeros_like(reaches)
-    y, side = x[0], 0.0
-    for k in range(x.size):
-        if side == 0.0:
-            if x[k] - y >= gap:
-                side = 1.0
-            elif x[k] - y <= -gap:
-                side = -1.0
-        if side != 0.0:
-            move = x[k] - side * gap - y
-            before = after = 0.0
-            for i in range(z.size):
-                before += stiffness[i] * z[i]
-                after += stiffness[i] * min(max(z[i] + move, -reaches[i]), reaches[i])
-            part = 1.0
-            if after * side < 0.0:
-                part = before / (before - after) if before != after else 0.0
-                part = min(max(part, 0.0), 1.0)
-            for i in range(z.size):
-                z[i] = min(max(z[i] + part * move, -reaches[i]), reaches[i])
-            y += part * move
-            if part < 1.0:
-                side = 0.0
-        out[k] = y
-    return out
-
-
-def true_position(effects: Sequence[Effect], time: Floats, measured: Floats) -> Floats:
-    """Return the position (m) behind a measured one: the sensor effects undone, last first."""
-    sensors = sorted((e for e in effects if e.place is Place.SENSOR), key=lambda e: -e.order)
-    if not sensors:
-        return measured
-    rows = new_rows(measured.size)
-    rows[:, TIME], rows[:, SENSED] = time, measured
-    rows[:, STEP] = np.gradient(time)
-    for effect in sensors:
-        if effect.inverse is None:
-            from scipy.interpolate import CubicSpline
-
-            late = float(effect.values.get("delay", 0.0))
-            rows[:, SENSED] = CubicSpline(time, rows[:, SENSED])(np.minimum(time + late, time[-1]))
-            continue
-        p, state = np.append(effect.vector(), 0.0), np.append(effect.initial_state(), 0.0)
-        _undo(effect.inverse.address, p, state, rows)
-    return np.ascontiguousarray(rows[:, SENSED])
-
-
-@compiled
-def _undo(address: int, p: Floats, state: Floats, rows: Floats) -> None:
-    for k in range(rows.shape[0]):
-        call_effect(address, p.ctypes.data, state.ctypes.data, rows[k].ctypes.data)
 
 
 def grid_of(stage: Stage, scale: float = 1.0) -> Floats:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rtcomp.diagnosis.jumps import jumps
 from rtcomp.diagnosis.stretches import LEAST_ROWS, stretches
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect
@@ -22,14 +23,14 @@ WINDOW_ROWS = 12_000
 WINDOWS = 5
 SAMPLE = 6_000
 """Rows of each window from which the bandwidth is judged."""
-OVERSAMPLED = 8.0
+OVERSAMPLED = 6.5
 """Rate over bandwidth, at the most: friction is exact over a displacement, finer rows only cost time."""
 WASHED = 2.2
 """Travel within a strip, in longest reaches, after which friction has forgotten what was before it."""
 LEAD = 0.2
 """Part of a recording that may go by until then; else what was before it has to be taken as nothing."""
-BLOCKS = 12
-UNSEEN = (4, 9)
+BLOCKS = 24
+UNSEEN = (3, 9, 14, 20)
 """Blocks that neither fitting nor selection sees."""
 
 
@@ -56,6 +57,10 @@ class Motion:
     cut: float
     coarse: bool = False
     """Whether positions were smoothed, lest every count of the encoder be a reversal."""
+    averaged: int = 1
+    """Rows of the recording to one of the strips."""
+    jumps: tuple[tuple[float, float], ...] = ()
+    """Times (s) and sizes (m) of jumps that the sensor may have made."""
 
     @property
     def period(self) -> float:
@@ -115,13 +120,14 @@ def prepare(stage: Stage, recordings: Sequence[Recording], cut: float | None = N
         strips = wholes
     else:
         strips = [s for w in wholes for s in _windows(w, factor * WINDOW_ROWS // len(wholes), reach)]
+    jumped = tuple(j for s in strips for j in jumps(s.time, s.position))
     coarse = _coarse(stage, strips)
     if coarse:
         strips = [replace(s, position=unstepped(s.position, cut, rate)) for s in strips]
     if factor > 1:
-        strips = [_averaged(s, factor) for s in strips]
+        strips = [averaged(s, factor) for s in strips]
         rate /= factor
-    return Motion(strips, rate, cut, coarse)
+    return Motion(strips, rate, cut, coarse, factor, jumped)
 
 
 def longest_reach(friction: Effect | None) -> float:
@@ -174,18 +180,22 @@ def _part(strip: Strip, rows: slice) -> Strip:
     return Strip(strip.time[rows], strip.position[rows], strip.voltage[rows], reference)
 
 
-def _averaged(strip: Strip, factor: int) -> Strip:
+def averaged(strip: Strip, factor: int) -> Strip:
+    """Return the means of so many rows each; a command is held from its mean row to the next."""
     count = strip.time.size // factor
 
     def mean(a: Floats) -> Floats:
         return np.asarray(a[: count * factor].reshape(count, factor).mean(axis=1))
 
-    # Position at the middle of the averaged rows; commands held over them average to the same middle,
-    # half a short row later.
+    time = mean(strip.time)
+    # A command is held from its row to the next one: from the middle of the averaged rows on, too.
+    given = np.concatenate([[0.0], np.cumsum(strip.voltage)])
+    edges = np.arange(count + 1) * factor + 0.5 * (factor - 1)
+    held = np.diff(np.interp(edges, np.arange(given.size), given)) / factor
     return Strip(
-        mean(strip.time),
+        time,
         mean(strip.position),
-        mean(strip.voltage),
+        held,
         None if strip.reference is None else mean(strip.reference),
         -(-strip.lead // factor),
     )

@@ -9,6 +9,7 @@ import numpy as np
 
 from rtcomp.diagnosis.base import Fitted, bounds_of
 from rtcomp.diagnosis.candidates import effect_of
+from rtcomp.diagnosis.departure import off
 from rtcomp.diagnosis.ledger import Ledger, System
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.scene import Entry
@@ -16,6 +17,16 @@ from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Parameter, catalogue
 
+SCALING = ("drive-gain", "sensor-scale", "inertia")
+"""Entries that do what other believed numbers would do together."""
+SEARCHED = ("time", "stiffening")
+"""Parameters that the search settles: a jump is between two rows, contacts stiffen or do not."""
+BELIEF = 3e-4
+"""Weight of a believed number's usual error, in squared errors of the whole recording."""
+HEAVY = 0.5
+"""Part of the drive's force that friction takes by load, at the most."""
+SETTLED = 1e-4
+"""Gain of a step, relative, from which on a step of less than the derivative's own ends the search."""
 TRIES = 12
 """Steps of Levenberg and Marquardt at the most."""
 
@@ -42,6 +53,8 @@ class Refined:
     """(n_seen, q): change of the residual (N) with each knob, the base refitted."""
     residual: Floats
     """(n_seen,) N."""
+    away: Floats
+    """(5, q): change of `departure.off` with each knob."""
 
     @property
     def errors(self) -> Floats:
@@ -63,6 +76,8 @@ def knobs_of(entries: Sequence[Entry], motion: Motion, which: Sequence[int] | No
                 continue
             size = abs(float(value))
             step = 0.01 * size
+            if parameter.name in SEARCHED:
+                continue
             if parameter.name == "period":
                 step = min(0.02 * size, 0.05 * size**2 / (high - low))
             elif parameter.name == "phase":
@@ -75,6 +90,8 @@ def knobs_of(entries: Sequence[Entry], motion: Motion, which: Sequence[int] | No
                 continue
             # A wave longer than the stroke is a slope or an offset by another name.
             most = 1.2 * (high - low) if parameter.name == "period" else None
+            if entry["name"] == "load-dependent-friction":
+                most = HEAVY  # more would be a drive that locks itself
             found.append(Knob(i, parameter, step, most))
     return found
 
@@ -141,19 +158,30 @@ def refine(
     knobs = knobs_of(current, motion, which)
     fitted, residual = evaluate(base, current, released)
     damping = 1e-3
-    jacobian = np.zeros((residual.size, len(knobs)))
+    belief = off(fitted)
+    jacobian, away = np.zeros((residual.size, len(knobs))), np.zeros((belief.size, len(knobs)))
     if not knobs:
-        return Refined(current, fitted, knobs, jacobian, residual)
+        return Refined(current, fitted, knobs, jacobian, residual, away)
     for _ in range(tries):
-        for j in range(len(knobs)):
-            one = np.zeros(len(knobs))
-            one[j] = 1.0
-            try:
-                jacobian[:, j] = evaluate(base, at(current, knobs, one), released)[1] - residual
-            except ConfigError:
-                jacobian[:, j] = 0.0
-        gram, slope = jacobian.T @ jacobian, jacobian.T @ residual
-        before = float(residual @ residual)
+        # Just enough to hold what the recording does not tell.
+        weight = BELIEF * float(residual @ residual)
+        for j, knob in enumerate(knobs):
+            jacobian[:, j] = away[:, j] = 0.0
+            scales = current[knob.entry]["name"] in SCALING
+            for way in (1.0, -1.0) if scales else (1.0,):
+                one = np.zeros(len(knobs))
+                one[j] = way
+                try:
+                    other, left = evaluate(base, at(current, knobs, one), released)
+                except ConfigError:
+                    continue
+                slope = way * (left - residual)
+                # Where a believed number is at its bound, only one way is told by the recording.
+                if way > 0 or slope @ slope < 0.25 * float(jacobian[:, j] @ jacobian[:, j]):
+                    jacobian[:, j], away[:, j] = slope, way * (off(other) - belief)
+        gram = jacobian.T @ jacobian + weight * away.T @ away
+        slope = jacobian.T @ residual + weight * away.T @ belief
+        before = float(residual @ residual + weight * belief @ belief)
         improved = False
         for _ in range(5):
             diagonal = np.diag(gram) + 1e-12 * np.trace(gram) / len(knobs) + 1e-300
@@ -165,19 +193,21 @@ def refine(
             except ConfigError:
                 damping *= 10.0
                 continue
-            if float(left @ left) < before:
+            further = off(tried)
+            after = float(left @ left + weight * further @ further)
+            if after < before:
                 improved = True
                 break
             damping *= 10.0
         if not improved:
             break
-        gained = 1.0 - float(left @ left) / before
-        current, fitted, residual = trial, tried, left
+        gained = 1.0 - after / before
+        current, fitted, residual, belief = trial, tried, left, further
         knobs = knobs_of(current, motion, which)
         damping = max(damping * 0.2, 1e-6)
-        if gained < 1e-4:
+        if gained < SETTLED and float(np.max(np.abs(move))) < 1.0:
             break
-    return Refined(current, fitted, knobs, jacobian, residual)
+    return Refined(current, fitted, knobs, jacobian, residual, away)
 
 
 MODEL = 0.004
@@ -197,19 +227,21 @@ def intervals(refined: Refined) -> dict[tuple[int, str], tuple[float, float]]:
     from scipy.stats import t as student
 
     ledger = refined.fitted.ledger
+    row = ledger.motion.period
+    times = [(i, float(e["time"])) for i, e in enumerate(refined.entries) if "time" in e]  # type: ignore[arg-type]
+    found = {(i, "time"): (t - row, t + row) for i, t in times}
     block = ledger.block[ledger.seen[ledger.block]]
     j, r = refined.jacobian, refined.residual
     if not refined.knobs:
-        return {}
+        return found
     gram = j.T @ j
-    inverse = np.linalg.pinv(gram, rcond=1e-10)
     blocks = np.unique(block)
     scores = np.array([j[block == b].T @ r[block == b] for b in blocks])
     count = blocks.size
     meat = scores.T @ scores * count / max(count - 1, 1)
-    spread = np.sqrt(np.maximum(np.diag(inverse @ meat @ inverse), 0.0))
+    told = gram @ np.linalg.pinv(meat, rcond=1e-12) @ gram
+    spread = np.sqrt(np.diag(np.linalg.pinv(told + refined.away.T @ refined.away, rcond=1e-12)))
     factor = float(student.ppf(0.975, max(count - 1, 1)))
-    found = {}
     for knob, sd in zip(refined.knobs, spread, strict=True):
         value = float(refined.entries[knob.entry][knob.parameter.name])  # type: ignore[arg-type]
         half = float(np.hypot(factor * float(sd) * knob.step, MODEL * _scale(knob, value)))

@@ -5,13 +5,15 @@ Sizes come from the recording at hand: its commands, speeds, times, its noise, a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
 
 from rtcomp.diagnosis.periodogram import periodogram
 from rtcomp.diagnosis.scene import Entry, Point, Scene
+
+SLOW = 0.5
+"""Part of the bandwidth up to which a wave of the reading is taken to be seen as it is."""
 
 
 def at_work(scene: Scene) -> Iterator[Point]:
@@ -47,7 +49,7 @@ def _presliding(s: Scene) -> list[Point]:
     reach = float(s.fitted.ledger.reaches.max())
     points: list[Entry] = [{"name": "asymmetric-friction", "asymmetry": a} for a in (-0.2, -0.05, 0.05, 0.2)]
     points += [{"name": "non-congruent-friction", "softening": a} for a in (0.05, 0.2, 0.5)]
-    points += [{"name": "load-dependent-friction", "coefficient": a} for a in (0.03, 0.15)]
+    points += [{"name": "load-dependent-friction", "coefficient": a} for a in (0.03, 0.08, 0.2)]
     points += [
         {"name": "stiction-ageing", "growth": g, "distance": d * reach}
         for g in (0.05, 0.2)
@@ -73,15 +75,17 @@ def _inertial(s: Scene) -> list[Point]:
 
 
 def _sensing(s: Scene) -> list[Point]:
-    points: list[Entry] = []
-    noise = max(
-        float(np.hypot(s.fitted.ledger.stage.sensor.noise, s.fitted.ledger.stage.sensor.resolution)), 1e-9
-    )
+    points: list[Entry] = [{"name": "sensor-scale", "scale": f} for f in (0.77, 0.88, 1.14, 1.3)]
     for period in _cyclic_periods(s):
+        amplitude, phase = _cyclic_size(s, period)
         points += [
-            {"name": "sensor-periodic-error", "amplitude": a * noise, "period": period, "phase": p}
-            for a in (5.0, 20.0)
-            for p in (0.0, math.pi / 2, math.pi, -math.pi / 2)
+            {
+                "name": "sensor-periodic-error",
+                "amplitude": a * amplitude,
+                "period": period,
+                "phase": phase + p,
+            }
+            for a, p in ((1.0, 0.0), (0.5, 0.0), (2.0, 0.0), (1.0, 1.57), (1.0, 3.14), (1.0, -1.57))
         ]
     reach = float(s.fitted.ledger.reaches[0])
     total = float(s.time.max())
@@ -90,12 +94,12 @@ def _sensing(s: Scene) -> list[Point]:
         for d in (-100.0, -15.0, -2.0, 2.0, 15.0, 100.0)
         for t in (0.03, 0.15, 0.6)
     ]
-    if _changes_once(s):
-        points += [
-            {"name": "sensor-jump", "size": d * reach, "time": t}
-            for t in _steps(s)
-            for d in (-2.0, -0.3, 0.3, 2.0)
-        ]
+    points += [{"name": "sensor-jump", "size": d, "time": t} for t, d in s.motion.jumps]
+    points += [
+        {"name": "sensor-jump", "size": d * reach, "time": t}
+        for t in _steps(s)
+        for d in (-2.0, -0.3, 0.3, 2.0)
+    ]
     return [Point(p) for p in points]
 
 
@@ -116,10 +120,19 @@ def _cyclic_periods(s: Scene, peaks: int = 2) -> list[float]:
     return found
 
 
-def _changes_once(s: Scene) -> bool:
-    """Tell whether the residual is unlike before and after some time."""
-    total = np.cumsum(s.residual - s.residual.mean())
-    return bool(np.ptp(total) > 0)
+def _cyclic_size(s: Scene, period: float) -> tuple[float, float]:
+    """Return amplitude (m) and phase of the error whose apparent acceleration explains most of the residual.
+
+    A reading x + A sin(k x + phase) accelerates by -A k^2 v^2 sin(k x + phase) where it is fast; where so
+    fast that the wave leaves the comparison's bandwidth, nothing is seen of it.
+    """
+    k = 2 * np.pi / period
+    weight = s.fitted.ledger.stage.mass * (k * s.v) ** 2
+    seen = k * np.abs(s.v) < 2 * np.pi * SLOW * s.motion.cut
+    waves = np.column_stack([weight * np.sin(k * s.x), weight * np.cos(k * s.x)])[seen]
+    size, *_ = np.linalg.lstsq(waves, s.residual[seen], rcond=None)
+    most = 0.3 / k  # beyond 1 / k the reading would run backwards
+    return min(max(float(np.hypot(*size)), 1e-12), most), float(np.arctan2(size[1], size[0]))
 
 
 def _steps(s: Scene, count: int = 3) -> list[float]:

@@ -5,14 +5,15 @@ from __future__ import annotations
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.wires import DRIVE, GRIP_LEVEL, PUSH, REACH
+from rtcomp.physics.place_dependent import STIFFENING, grow
+from rtcomp.physics.wires import DRIVE, GRIP_LEVEL, PUSH
 
 
 @effect_kernel
 def load_dependent_friction(p: Floats, s: Floats, w: Floats) -> None:
-    """p: coefficient (1), external (1)."""
+    """p: coefficient (1), external (1), stiffening (1)."""
     if w[GRIP_LEVEL] > 0.0:
-        w[REACH] *= 1.0 + abs(p[0] * w[DRIVE] - p[1] * w[PUSH]) / w[GRIP_LEVEL]
+        grow(w, 1.0 + abs(p[0] * w[DRIVE] - p[1] * w[PUSH]) / w[GRIP_LEVEL], p[2])
 
 
 @register
@@ -20,10 +21,11 @@ class LoadDependentFriction(Effect):
     """Friction grows with the transmitted load.
 
     The load is the size of the drive's force, which carries weight and inertia as well. The sliding level
-    grows by `coefficient` times it, at equal stiffness: while everything sticks a changing load changes no
-    force, and elements beyond a falling level slip back to it. A gear is loaded from its other side too:
-    weight and springs, which hold against the drive, add `external` times theirs. It needs a friction model
-    in the stage; the level, where it falls with speed, is that of the step before.
+    grows by `coefficient` times it; with `stiffening` 0 at equal stiffness: while all sticks a changing
+    load changes no force, and elements beyond a falling level slip back to it. With 1 the whole force grows.
+    A gear is loaded from its other side too: weight and springs, which hold against the drive, add `external`
+    times theirs. It needs a friction model in the stage; the level, where it falls with speed, is that of the
+    step before.
     """
 
     name = "load-dependent-friction"
@@ -31,6 +33,7 @@ class LoadDependentFriction(Effect):
     parameters = (
         Parameter("coefficient", "1", 0.0, 10.0, "friction force over the force of the drive"),
         Parameter("external", "1", 0.0, 10.0, "the same over weight, springs and other forces", 0.0),
+        STIFFENING,
     )
     kernel = load_dependent_friction
     says = "friction grows with the force that the drive transmits, as in gears and screws"

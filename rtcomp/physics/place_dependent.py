@@ -4,24 +4,42 @@ from __future__ import annotations
 
 import math
 
-from rtcomp.kernels import Floats, effect_kernel
+from rtcomp.kernels import Floats, compiled, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.drive import PERIOD, PHASE
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.wires import POSITION, REACH
+from rtcomp.physics.wires import POSITION, REACH, SCALE
+
+STIFFENING = Parameter(
+    "stiffening", "1", 0.0, 1.0, "1: contacts that hold more are stiffer, 0: they only hold more", 0.0
+)
+
+
+@compiled
+def grow(w: Floats, factor: float, stiffening: float) -> None:
+    """Multiply the level of friction by `factor`, its stiffness by factor^stiffening."""
+    if stiffening > 0.0:
+        shared = factor**stiffening
+        w[SCALE] *= shared
+        factor /= shared
+    w[REACH] *= factor
 
 
 @effect_kernel
 def position_dependent_friction(p: Floats, s: Floats, w: Floats) -> None:
-    """p: amplitude (1), period (m), phase (rad), slope (1/m)."""
+    """p: amplitude (1), period (m), phase (rad), slope (1/m), stiffening (1)."""
     x = w[POSITION]
     factor = 1.0 + p[0] * math.sin(2.0 * math.pi * x / p[1] + p[2]) + p[3] * x
-    w[REACH] *= max(factor, 1e-3)  # friction never drives
+    grow(w, max(factor, 1e-3), p[4])  # friction never drives
 
 
 @register
 class PositionDependentFriction(Effect):
-    """Friction level varies along the stroke."""
+    """Friction level varies along the stroke.
+
+    With `stiffening` 0 contacts yield later at equal stiffness; with 1 the whole force varies, as where the
+    number of contacts does.
+    """
 
     name = "position-dependent-friction"
     place = Place.FRICTION
@@ -30,10 +48,11 @@ class PositionDependentFriction(Effect):
         PERIOD,
         PHASE,
         Parameter("slope", "1/m", -1e6, 1e6, "relative growth along the stroke", 0.0),
+        STIFFENING,
     )
     kernel = position_dependent_friction
     says = "contacts yield later in some places than in others: preload, wear, dirt"
-    equation = "yield <- yield (1 + a sin(2 pi x / period + phase) + slope x)"
+    equation = "yield <- yield (1 + a sin(2 pi x / period + phase) + slope x), at equal stiffness or reach"
     source = (
         "Popovic, Goldenberg (1998), IEEE Trans. Robotics and Automation 14(1), spectral friction in position"
     )

@@ -16,6 +16,11 @@ REACH = 64
 THRESHOLD = 8.0
 COMMAND_THRESHOLD = 16.0
 """For a command: a controller that differentiates a coarse sensor spikes of its own."""
+BACK = 0.5
+"""Part of an outlier's distance within which the signal must be back after it."""
+ANSWERED = 12.0
+ANSWER = 4
+"""Rows for which a controller is taken to answer a step."""
 COUNTS = 4.5
 """An outlier is further off than this many of the sensor's counts, however quiet the signal."""
 
@@ -40,6 +45,35 @@ def outliers(signal: Floats, threshold: float = THRESHOLD) -> npt.NDArray[np.boo
         near = signal[begin : piece.stop + REACH]
         inside = slice(piece.start - begin, piece.stop - begin)
         found[piece] = _far(near, threshold, usual, least)[inside]
+    return _returned(signal, found)
+
+
+def _returned(signal: Floats, found: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Unmark runs after which the signal is not back where it was: steps, which the sensor did make."""
+    edges = np.flatnonzero(np.diff(found.astype(np.int8), prepend=0, append=0))
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        if first > 0 and last < len(signal):
+            before, after = signal[first - 1], signal[last]
+            if abs(after - before) > BACK * np.max(np.abs(signal[first:last] - before)):
+                found[first:last] = False
+    return found
+
+
+def answers(position: Floats) -> npt.NDArray[np.bool_]:
+    """Return the rows at which a controller answers a step of the `position` reading, which is no outlier.
+
+    A step is a difference of readings that is unlike its neighbours by more than ANSWERED robust standard
+    deviations.
+    """
+    step = np.diff(position, prepend=position[0])
+    off = np.zeros_like(step)
+    off[2:-2] = np.abs(step[2:-2] - 0.25 * (step[:-4] + step[1:-3] + step[3:-1] + step[4:]))
+    parts = sample(off)
+    usual = 1.4826 * float(np.median(np.concatenate(parts)))
+    stepped = off > ANSWERED * max(usual, _resolution(sample(position)))
+    found = stepped.copy()
+    for late in range(1, ANSWER + 1):
+        found[late:] |= stepped[:-late]
     return found
 
 

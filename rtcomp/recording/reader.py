@@ -289,12 +289,14 @@ def _even(
 
 
 def _marked(columns: Mapping[str, Floats], notes: list[str]) -> npt.NDArray[np.bool_]:
-    from rtcomp.recording.outliers import COMMAND_THRESHOLD, THRESHOLD, outliers
+    from rtcomp.recording.outliers import COMMAND_THRESHOLD, THRESHOLD, answers, outliers
 
     marked = np.zeros(len(columns["time"]), dtype=np.bool_)
     for name, threshold in (("position", THRESHOLD), ("voltage", COMMAND_THRESHOLD)):
         if name in columns:
             found = outliers(columns[name], threshold)
+            if name == "voltage" and found.any():
+                found &= ~answers(columns["position"])
             marked |= found
             if found.any():
                 at = columns["time"][int(np.argmax(found))]

@@ -10,7 +10,7 @@ from recorded import STAGE
 
 from rtcomp.diagnosis.bank import units_along
 from rtcomp.diagnosis.ledger import believed_weights
-from rtcomp.diagnosis.motion import WASHED, WINDOW_ROWS, WINDOWS, prepare
+from rtcomp.diagnosis.motion import WASHED, WINDOW_ROWS, WINDOWS, Strip, averaged, prepare
 from rtcomp.kernels import Floats
 from rtcomp.physics import build
 from rtcomp.physics.effect import Place
@@ -92,3 +92,34 @@ def test_windows_of_a_long_recording_bring_their_lead_along() -> None:
         assert WASHED * 1.2e-5 <= np.ptp(strip.position[: strip.lead + 1]) <= 1.3 * WASHED * 1.2e-5
         rows = (strip.time[-1] - strip.time[strip.lead]) * 1000.0
         assert rows == pytest.approx(WINDOW_ROWS, rel=0.01)
+
+
+@pytest.mark.parametrize("factor", [2, 3, 5])
+def test_averaged_commands_are_held_from_their_row_on(factor: int) -> None:
+    """As those of a recording are; else every averaged recording would look late."""
+    time = np.arange(600) / 4000.0
+    volts = np.random.default_rng(4).standard_normal(600)
+    strip = averaged(Strip(time, np.zeros(600), volts, None), factor)
+    fine = np.repeat(volts, 100)
+    for row in (3, 50, 90):
+        begin = round(strip.time[row] * 4000.0 * 100.0)
+        assert strip.voltage[row] == pytest.approx(fine[begin : begin + 100 * factor].mean(), abs=1e-9)
+
+
+def test_contacts_that_stiffen_multiply_the_whole_force() -> None:
+    """With `stiffening` 1 presliding and sliding grow alike, without it only the level does."""
+    stage = Stage.from_dict(STAGE)
+    time, x = wander()
+    v = np.gradient(x, time)
+    zero = np.zeros_like(x)
+    plain = forces(stage, [stage.friction], time, x, v, zero, zero).friction  # type: ignore[list-item]
+    entry = {"name": "position-dependent-friction", "amplitude": 0.3, "period": 2e-5, "phase": 0.4}
+    factor = 1.0 + 0.3 * np.sin(2 * np.pi * x / 2e-5 + 0.4)
+    found = {}
+    for stiffening in (0.0, 1.0):
+        effect = build({**entry, "stiffening": stiffening})
+        chain = [effect, stage.friction]
+        found[stiffening] = forces(stage, chain, time, x, v, zero, zero).friction  # type: ignore[arg-type]
+    assert found[1.0] == pytest.approx(factor * plain, rel=1e-12)
+    sliding = np.abs(plain) == np.abs(plain).max()
+    assert found[0.0][~sliding] != pytest.approx((factor * plain)[~sliding], rel=1e-3)

@@ -1,0 +1,106 @@
+"""The entry that explains most beside those at work: screened, short-listed, refined on its own grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtcomp.diagnosis.alike import SHAPELESS, last, least_far
+from rtcomp.diagnosis.base import SCALES, Fitted, fit_base
+from rtcomp.diagnosis.candidates import effect_of
+from rtcomp.diagnosis.motion import Motion
+from rtcomp.diagnosis.refine import Refined, refine
+from rtcomp.diagnosis.scene import Entry, Scene
+from rtcomp.diagnosis.screen import Screened, screen
+from rtcomp.errors import ConfigError
+from rtcomp.stage.stage import Stage
+
+SHORTLIST = 7
+LEAST_SHARE = 0.008
+"""Part of the squared error that a search must explain to be short-listed."""
+QUICK, CONTENDERS = 2, 3
+"""Steps of refinement for the whole short list, and how many of it are refined to the end."""
+NEARLY = 0.93
+"""Part of what a shapeless entry explains, from which on a name with a shape of its own is preferred."""
+_STIFF: tuple[Entry, ...] = ({}, {"stiffening": 1.0})
+VARIANTS = {"position-dependent-friction": _STIFF, "load-dependent-friction": _STIFF}
+"""Entries that come in more than one form, of which a search knows only one."""
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class Addition:
+    """The best entry beside those at work (the last of its entries), the other contenders, the first look."""
+
+    best: Refined | None
+    others: list[Refined]
+    looked: list[Screened]
+    gains: dict[str, float]
+    """Part of the squared error that each short-listed name explains."""
+
+
+def best_addition(
+    stage: Stage,
+    motion: Motion,
+    current: Fitted,
+    entries: list[Entry],
+    progress: Progress,
+    without: frozenset[str] = frozenset(),
+) -> Addition:
+    """Return what explains most of what `current`, with `entries` at work, leaves; no name of `without`."""
+    looked = screen(Scene.of(motion, current), entries, lambda part: progress(0.6 * part, "screen"))
+    named = {str(e["name"]) for e in entries} - {"cogging"} | without
+    hopeful = [s for s in looked if s.name not in named]
+    hopeful = [s for s in hopeful if s.gain(current.errors) > LEAST_SHARE][:SHORTLIST]
+    tried: list[Refined] = []
+    gains: dict[str, float] = {}
+    for i, s in enumerate(hopeful):
+        done = _quickly(current, motion, entries, s.entry)
+        if done is None:
+            continue
+        gains[s.name] = 1.0 - float(done.errors.sum() / current.errors.sum())
+        tried.append(done)
+        progress(0.6 + 0.4 * (i + 1) / len(hopeful), "refine")
+    tried.sort(key=lambda r: float(r.errors.sum()))
+    if not tried:
+        return Addition(None, [], looked, gains)
+    for i, r in enumerate(tried[:CONTENDERS]):
+        if gains[last(r)] > 0.5 * gains[last(tried[0])]:
+            # On its own grid of reaches: a base that has bent to an effect is no fair ground for its name.
+            tried[i] = settle(stage, motion, r, SCALES)
+            gains[last(r)] = 1.0 - float(tried[i].errors.sum() / current.errors.sum())
+    tried.sort(key=lambda r: float(r.errors.sum()))
+    best = least_far(tried, current)
+    if last(best) in SHAPELESS:
+        reduction = float(current.errors.sum() - best.errors.sum())
+        for other in tried[1:]:
+            if float(current.errors.sum() - other.errors.sum()) > NEARLY * reduction:
+                best = other
+                break
+    return Addition(best, [r for r in tried if r is not best], looked, gains)
+
+
+def _quickly(current: Fitted, motion: Motion, entries: list[Entry], entry: Entry) -> Refined | None:
+    """Return a few steps of refinement of the best variant of `entry`; None where none can be evaluated."""
+    found = []
+    for variant in VARIANTS.get(str(entry["name"]), ({},)):
+        try:
+            made = [*entries, {**entry, **variant}]
+            found.append(refine(current, motion, made, which=[len(entries)], tries=QUICK))
+        except (ConfigError, np.linalg.LinAlgError):
+            continue
+    return min(found, key=lambda r: float(r.errors.sum()), default=None)
+
+
+def settle(
+    stage: Stage, motion: Motion, refined: Refined, scales: tuple[float, ...] | None = None
+) -> Refined:
+    """Find the reaches anew with the entries at work, then refine all entries together."""
+    effects = [effect_of(e) for e in refined.entries]
+    around = refined.fitted.scale
+    near = tuple(sorted({*(around * f for f in (0.8, 0.9, 1.0, 1.12, 1.25)), 1.0}))
+    base = fit_base(stage, motion, scales=scales or near, effects=effects)
+    return refine(base, motion, refined.entries)

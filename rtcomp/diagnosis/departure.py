@@ -1,0 +1,32 @@
+"""How far a fit takes the believed numbers: beliefs are off by a tenth, not by a third all at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rtcomp.diagnosis.base import FIXED, Fitted
+from rtcomp.diagnosis.extend import level_and_reach
+from rtcomp.kernels import Floats
+from rtcomp.physics.maxwell_slip import MaxwellSlip
+
+USUAL = 0.08
+"""How far off (logarithm) a believed number usually is."""
+
+
+def off(fitted: Fitted) -> Floats:
+    """Return the logarithms of refitted over believed numbers, in units of USUAL.
+
+    Those of mass, viscous friction, micro-damping, and level and reach of friction; 0 where none is believed.
+    """
+    stage, reaches = fitted.ledger.stage, fitted.ledger.reaches
+    c, m = fitted.coefficients, stage.mechanics
+    pairs = [(c[0], stage.mass), (c[1], m.viscous), (c[2], m.micro_damping)]
+    if isinstance(stage.friction, MaxwellSlip):
+        found = level_and_reach(list(zip(c[FIXED : FIXED + reaches.size], reaches, strict=True)))
+        pairs += list(zip(found, level_and_reach(stage.friction.elements), strict=True))
+    return np.array([np.log(max(now, 1e-3 * was) / was) / USUAL if was > 0 else 0.0 for now, was in pairs])
+
+
+def departure(fitted: Fitted) -> float:
+    """Return the squared distance of the refitted numbers from the believed ones, 0 where all are usual."""
+    return float(np.sum(np.maximum(np.abs(off(fitted)) - 1.0, 0.0) ** 2))

@@ -1,0 +1,126 @@
+"""An explanation: names decided on, put into the stage, and held against what was put aside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtcomp.diagnosis.addition import Progress
+from rtcomp.diagnosis.base import Fitted
+from rtcomp.diagnosis.decide import Choice, Decision, decide
+from rtcomp.diagnosis.extend import extended_stage
+from rtcomp.diagnosis.locate import locate
+from rtcomp.diagnosis.motion import UNSEEN, Motion
+from rtcomp.diagnosis.result import Fit
+from rtcomp.diagnosis.scene import Entry
+from rtcomp.kernels import Floats
+from rtcomp.stage.balance import force_balance
+from rtcomp.stage.stage import Stage
+
+STRUCTURED = 0.3
+"""Part of the remaining mismatch that depends on one axis, from which on names are taken back."""
+HARM, WORSE, HELP = 1.02, 1.1, 0.95
+"""Factors on the held-out error of the stage, believed, retuned and (where it is more than the floor) retuned
+again, beyond which names are taken back."""
+AGAIN = 2
+"""Times that names which do not hold are left out and others are looked for."""
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What was decided, what of it is named, the stage that has it, how that does on what was put aside."""
+
+    decision: Decision
+    named: list[Entry]
+    entries: list[Entry]
+    """All that is at work in the fit, also what only changes a believed number."""
+    stage: Stage
+    final: Fitted
+    fit: Fit
+
+
+def explain(
+    stage: Stage, motion: Motion, base: Fitted, floor: Floats, least: Floats, say: Progress, seed: int
+) -> Explanation:
+    """Say what `stage` leaves out; names that do not hold on what was put aside are not given.
+
+    `floor` and `least` are squared errors (N^2) of seen blocks: left by noise and method, and worth a look.
+    """
+    retuned = extended_stage(stage, base, [])
+    before, plain = _held_out(stage, motion), _held_out(retuned, motion)
+    power = float(base.system.blocks.power[base.ledger.seen].sum())
+    rest = float(np.sqrt(floor.sum() / power))
+    without: frozenset[str] = frozenset()
+    looks = []
+    for _ in range(AGAIN + 1):
+        decision = decide(stage, motion, base, least, say, without)
+        looks.append((decision.first_look, decision.first_refined))
+        decision.first_look, decision.first_refined = looks[0]
+        final = decision.refined.fitted
+        if not decision.choices:
+            break
+        # Names that leave a clear dependence on something are the nearest names, not the right ones.
+        left = locate(motion, final.residual, None, seed)
+        decision.abstain_if_poor(least, any(p.share > STRUCTURED for p in left))
+        if not decision.choices:
+            break
+        entries = [dict(e) for e in decision.refined.entries]
+        first = str(entries[0]["name"])
+        named, own, decision.choices = _fold(stage, final, entries, decision.choices)
+        fit = Fit(before, plain, _held_out(own, motion), rest)
+        if not named or _holds(fit):
+            return Explanation(decision, named, entries, own, final, fit)
+        without |= {first}
+    # What the ledger gains must hold in the stage itself; else it is not offered as an explanation.
+    decision.choices = []
+    return Explanation(decision, [], [], retuned, base, Fit(before, plain, plain, rest))
+
+
+def _holds(fit: Fit) -> bool:
+    """Tell whether names hold on what was put aside: they do no harm there, and help where there is need."""
+    much = 1.5 * fit.floor
+    if fit.after > HARM * fit.before or fit.after > max(WORSE * fit.retuned, much):
+        return False
+    return fit.retuned < much or fit.after < HELP * fit.retuned
+
+
+def _held_out(stage: Stage, motion: Motion) -> float:
+    """Return the relative force error of a whole stage on what nothing was fitted to or chosen by."""
+    off = over = 0.0
+    block = motion.block()
+    start = 0
+    for strip in motion.strips:
+        balance = force_balance(stage, strip.time, strip.position, strip.voltage, motion.cut)
+        rows = motion.kept(strip)
+        drive, needed = balance.force_drive[rows], balance.force_motion[rows]
+        unseen = np.isin(block[start : start + drive.size], UNSEEN)
+        start += drive.size
+        off += float(np.sum((drive - needed)[unseen] ** 2))
+        over += float(np.sum(needed[unseen] ** 2))
+    return float(np.sqrt(off / over)) if over > 0 else 0.0
+
+
+FOLDED = ("viscous-friction", "inertia")
+"""Entries that are numbers of the believed stage with other values: reported as retuned."""
+
+
+def _fold(
+    stage: Stage, final: Fitted, found: list[Entry], choices: list[Choice]
+) -> tuple[list[Entry], Stage, list[Choice]]:
+    """Put entries that only change a believed number into that number; return the others, and the stage."""
+    named, kept, changes = [], [], {}
+    plain = extended_stage(stage, final, [])
+    for entry, choice in zip(found, choices, strict=True):
+        name = str(entry["name"])
+        if name == "viscous-friction" and stage.mechanics.viscous > 0:
+            value = plain.mechanics.viscous + float(entry["coefficient"])  # type: ignore[arg-type]
+            changes["viscous"] = max(value, 0.0)
+        elif name == "inertia":
+            # The base's mass is refitted beside the entry, whose kernel replaces the believed one.
+            changes["mass"] = float(entry["mass"]) * plain.mass / stage.mass  # type: ignore[arg-type]
+        else:
+            named.append(entry)
+            kept.append(choice)
+    own = extended_stage(stage, final, named)
+    return named, own.with_changes(stage=changes) if changes else own, kept

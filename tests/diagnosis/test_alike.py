@@ -1,0 +1,66 @@
+"""Names that a recording cannot tell apart, and the belief that decides between them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from recorded import run
+from recorded import stage as axis
+
+from rtcomp.diagnosis.base import fit_base
+from rtcomp.diagnosis.departure import USUAL, departure, off
+from rtcomp.diagnosis.diagnose import diagnose
+from rtcomp.diagnosis.motion import prepare
+from rtcomp.diagnosis.refine import intervals, refine
+from rtcomp.kernels import Floats
+
+
+def reference() -> Floats:
+    time = np.arange(0.0, 12.0, 1e-3)
+    waves = [np.sin(2 * np.pi * f * time) / f for f in (0.4, 1.1, 2.3, 5.0)]
+    fade = np.clip(np.minimum(time, time[-1] - time) / 0.5, 0.0, 1.0)
+    return 4e-4 * fade * np.sum(waves, axis=0)
+
+
+def test_what_is_believed_rightly_departs_by_nothing() -> None:
+    stage = axis()
+    fitted = fit_base(stage, prepare(stage, [run(stage, reference())]))
+    assert departure(fitted) == 0.0
+    assert np.all(np.abs(off(fitted)) < 1.0)
+
+
+def test_more_than_the_usual_departs_by_the_square_of_what_is_beyond() -> None:
+    stage = axis()
+    fitted = fit_base(stage, prepare(stage, [run(stage, reference())]))
+    light = stage.with_changes(stage={"mass": float(fitted.coefficients[0] / np.exp(3.0 * USUAL))})
+    ledger = replace(fitted.ledger, stage=light)
+    assert departure(replace(fitted, ledger=ledger)) == pytest.approx(4.0, rel=1e-9)
+
+
+def test_a_gain_is_estimated_as_well_as_the_belief_allows() -> None:
+    """Every column may move by a tenth: the recording alone says nothing more exact of the gain."""
+    true, believed = axis(force_constant=4.0 * 0.75), axis()
+    motion = prepare(believed, [run(true, reference())])
+    base = fit_base(believed, motion)
+    refined = refine(base, motion, [{"name": "drive-gain", "gain": 0.85}])
+    low, high = intervals(refined)[0, "gain"]
+    assert low < 0.75 < high
+    assert 0.02 < high - low < 0.4
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [("drive-gain", {"force_constant": 4.0 * 1.35}), ("inertia", {"mass": 2.0 * 1.5})],
+)
+def test_scaled_numbers_are_told_apart_by_what_they_leave_as_believed(
+    name: str, changes: dict[str, float]
+) -> None:
+    found = diagnose(axis(), [run(axis(**changes), reference())])
+    if name == "inertia":
+        moved = {r.parameter: r.after.value / r.before for r in found.retuned}
+        assert moved["mass"] == pytest.approx(1.5, rel=0.05)
+        assert not found.effects
+    else:
+        assert [e.names for e in found.effects] == [(name,)]

@@ -1,0 +1,61 @@
+"""Jumps of the sensor: found to the row, also where the controller answers them at once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtcomp.diagnosis.jumps import jumps
+from rtcomp.diagnosis.path import true_position
+from rtcomp.physics import build
+from rtcomp.recording.outliers import answers, outliers
+
+
+def moved(seed: int = 0, rows: int = 4000) -> tuple[np.ndarray, np.ndarray]:
+    random = np.random.default_rng(seed)
+    time = np.arange(rows) / 1000.0
+    return time, 2e-4 * np.sin(2.0 * time) + 1e-8 * random.standard_normal(rows)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 1000), st.integers(20, 3980), st.sampled_from([-1.0, 1.0]))
+def test_a_jump_is_found_to_the_row(seed: int, row: int, sign: float) -> None:
+    time, x = moved(seed)
+    x[row:] += sign * 2e-6
+    at, size = jumps(time, x)[0]
+    assert time[row - 1] < at < time[row]
+    assert size == pytest.approx(sign * 2e-6, rel=0.05)
+
+
+def test_a_smooth_motion_has_none() -> None:
+    time, x = moved()
+    assert all(abs(size) < 1e-7 for _, size in jumps(time, x))
+    assert jumps(time[:8], x[:8]) == []
+
+
+def test_means_over_rows_have_the_jump_within_them() -> None:
+    time, x = moved(rows=3000)
+    jumped = x + 3e-6 * (time >= 1.0005)
+    effect = build({"name": "sensor-jump", "size": 3e-6, "time": 1.0005})
+    mean = [a.reshape(-1, 3).mean(axis=1) for a in (time, jumped, x)]
+    assert true_position([effect], mean[0], mean[1], 3) == pytest.approx(mean[2], abs=1e-12)
+
+
+def test_a_step_that_the_controller_takes_back_is_no_outlier_but_a_spike_is() -> None:
+    _, x = moved()
+    stepped = x.copy()
+    stepped[2000:] += 5e-5 * np.exp(-np.arange(2000) / 8.0)
+    assert not outliers(stepped)[1990:2020].any()
+    spiked = x.copy()
+    spiked[2000:2002] += 5e-5
+    assert outliers(spiked)[2000:2002].all()
+
+
+def test_the_command_that_answers_a_step_is_told_from_one_that_does_not() -> None:
+    _, x = moved()
+    x[2000:] += 5e-5
+    answered = answers(x)
+    assert answered[2000:2004].all()
+    assert not answered[:1990].any() and not answered[2020:].any()
