@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtcomp.diagnosis.alike import SHAPELESS, last, least_far
+from rtcomp.diagnosis.alike import ONE_THING, SHAPELESS, last, least_far, plainest
 from rtcomp.diagnosis.base import SCALES, Fitted, fit_base
 from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.motion import Motion
@@ -24,9 +24,8 @@ QUICK, CONTENDERS = 2, 3
 """Steps of refinement for the whole short list, and how many of it are refined to the end."""
 NEARLY = 0.93
 """Part of what a shapeless entry explains, from which on a name with a shape of its own is preferred."""
-_STIFF: tuple[Entry, ...] = ({}, {"stiffening": 1.0})
-VARIANTS = {"position-dependent-friction": _STIFF, "load-dependent-friction": _STIFF}
-"""Entries that come in more than one form, of which a search knows only one."""
+BESIDE = {"backlash": "resonance", "resonance": "backlash"}
+"""Entries not looked for beside each other: a play has a contact that rings, a second mass goes loose."""
 
 Progress = Callable[[float, str], None]
 
@@ -53,6 +52,8 @@ def best_addition(
     """Return what explains most of what `current`, with `entries` at work, leaves; no name of `without`."""
     looked = screen(Scene.of(motion, current), entries, lambda part: progress(0.6 * part, "screen"))
     named = {str(e["name"]) for e in entries} - {"cogging"} | without
+    named |= {BESIDE[n] for n in named if n in BESIDE}
+    named |= {other for group in ONE_THING if named & set(group) for other in group}
     hopeful = [s for s in looked if s.name not in named]
     hopeful = [s for s in hopeful if s.gain(current.errors) > LEAST_SHARE][:SHORTLIST]
     tried: list[Refined] = []
@@ -61,7 +62,7 @@ def best_addition(
         done = _quickly(current, motion, entries, s.entry)
         if done is None:
             continue
-        gains[s.name] = 1.0 - float(done.errors.sum() / current.errors.sum())
+        gains[last(done)] = 1.0 - float(done.errors.sum() / current.errors.sum())
         tried.append(done)
         progress(0.6 + 0.4 * (i + 1) / len(hopeful), "refine")
     tried.sort(key=lambda r: float(r.errors.sum()))
@@ -72,7 +73,7 @@ def best_addition(
             # On its own grid of reaches: a base that has bent to an effect is no fair ground for its name.
             tried[i] = settle(stage, motion, r, SCALES)
             gains[last(r)] = 1.0 - float(tried[i].errors.sum() / current.errors.sum())
-    tried.sort(key=lambda r: float(r.errors.sum()))
+    tried = plainest(tried)
     best = least_far(tried, current)
     if last(best) in SHAPELESS:
         reduction = float(current.errors.sum() - best.errors.sum())
@@ -83,12 +84,26 @@ def best_addition(
     return Addition(best, [r for r in tried if r is not best], looked, gains)
 
 
+def _variants(entry: Entry, stage: Stage) -> list[Entry]:
+    """Return the forms that an entry comes in, of which a search knows only one; that one first."""
+    name = str(entry["name"])
+    if name in ("position-dependent-friction", "load-dependent-friction"):
+        return [entry, {**entry, "stiffening": 1.0}]
+    if name == "stiction-ageing":
+        return [{**entry, "onset": onset} for onset in (0.1, 0.01)]
+    if name == "drive-offset":
+        # The same force, but beside what changes the drive it is not the same physics.
+        force = float(entry["offset"]) * stage.force_constant  # type: ignore[arg-type]
+        return [entry, {"name": "constant-force", "force": force}]
+    return [entry]
+
+
 def _quickly(current: Fitted, motion: Motion, entries: list[Entry], entry: Entry) -> Refined | None:
     """Return a few steps of refinement of the best variant of `entry`; None where none can be evaluated."""
     found = []
-    for variant in VARIANTS.get(str(entry["name"]), ({},)):
+    for variant in _variants(entry, current.ledger.stage):
         try:
-            made = [*entries, {**entry, **variant}]
+            made = [*entries, variant]
             found.append(refine(current, motion, made, which=[len(entries)], tries=QUICK))
         except (ConfigError, np.linalg.LinAlgError):
             continue

@@ -17,6 +17,10 @@ FURTHER = 3.0
 """How much further (see `departure`) a name may take the believed numbers than the best one."""
 ALIKE = 0.06
 """Names are not told apart where they differ by less than this part of what the best explains."""
+PLAINER = {"asymmetric-viscous-friction": "viscous-friction"}
+"""Entries that are another one and more,"""
+NEEDLESS = 1.25
+"""and the factor on their error up to which the plainer one is taken."""
 SHAPELESS = ("position-force",)
 """Entries that take any shape: a name with a shape of its own is preferred where it explains as much."""
 ONE_THING = (
@@ -29,6 +33,18 @@ ONE_THING = (
 def last(refined: Refined) -> str:
     """Return the name of the entry that was added last."""
     return str(refined.entries[-1]["name"])
+
+
+def plainest(tried: Sequence[Refined]) -> list[Refined]:
+    """Return the contenders, best first, without those of which a plainer one explains nearly as much."""
+    errors = {last(r): float(r.errors.sum()) for r in tried}
+    needless = {
+        name
+        for name, plain in PLAINER.items()
+        if errors.get(plain, np.inf) < NEEDLESS * errors.get(name, 0.0)
+    }
+    kept = [r for r in tried if last(r) not in needless]
+    return sorted(kept, key=lambda r: float(r.errors.sum()))
 
 
 def least_far(tried: Sequence[Refined], current: Fitted) -> Refined:
@@ -68,7 +84,7 @@ def alike(best: Refined, rest: Sequence[Refined], current: Fitted, floor: Floats
             names.append(name)
             weights.append(float(np.exp(-max(lost, 0.0) / (0.3 * ALIKE))))
     for group in ONE_THING:
-        if names[0] == group[0]:
-            names += [g for g in group[1:] if g not in names]
+        if names[0] in group[:2]:
+            names += [g for g in group if g not in names]
             weights += [0.5] * (len(names) - len(weights))
     return names, float(weights[0] / sum(weights))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,25 +19,27 @@ BELIEVED = 0.12
 """How far off mass, viscous friction and micro-damping may be before that is a finding of its own."""
 SCALES = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.12, 1.25, 1.4, 1.6, 1.8)
 """Factors tried on the reaches of the friction grid."""
+RELEASED = {"asymmetric-viscous-friction": "viscous"}
+"""Entries that say how a believed number differs by direction, so that it may not be what was believed."""
 FIXED = 3
 """Columns before those of friction: mass, viscous, micro-damping."""
 
 
-def bounds_of(
-    stage: Stage, size: int, slack: float = BELIEVED, released: frozenset[str] = frozenset()
-) -> Bounds:
+def bounds_of(stage: Stage, size: int, slack: float = BELIEVED, names: Sequence[str] = ()) -> Bounds:
     """Return the bounds of the base's coefficients.
 
-    Mass, viscous and micro-damping stay within `slack` of the belief unless `released`; friction elements are
+    Mass, viscous and micro-damping stay within `slack` of the belief unless one of the entries `names`
+    releases them; friction elements are
     springs, not negative, so that the virgin curve rises ever less steeply.
     """
     m = stage.mechanics
+    released = {RELEASED[n] for n in names if n in RELEASED}
     biased = any(e.get("name") in BIASES for e in m.effects)
     low, high = np.zeros(size), np.full(size, np.inf)
     own = {"mass": stage.mass, "viscous": m.viscous, "micro_damping": m.micro_damping}
     for i, (name, value) in enumerate(own.items()):
         if name in released:
-            low[i] = 0.0 if name == "mass" else -np.inf
+            low[i] = 0.0
         else:
             low[i], high[i] = value * (1 - slack), value * (1 + slack)
     if biased:
@@ -76,7 +79,6 @@ def fit_base(
     motion: Motion,
     effects: list[Effect] | None = None,
     scales: tuple[float, ...] = SCALES,
-    released: frozenset[str] = frozenset(),
 ) -> Fitted:
     """Refit the believed stage, with `effects` at work, on the grid of reaches that predicts best."""
     best: Fitted | None = None
@@ -87,7 +89,7 @@ def fit_base(
         rounds = 3 if any(e.name in WHOLE for e in effects or ()) else 1
         for i in range(rounds):
             system = ledger.system((effects or []) if rounds == 1 or i else [])
-            bounds = bounds_of(stage, system.columns.shape[1], released=released)
+            bounds = bounds_of(stage, system.columns.shape[1], names=[e.name for e in effects or ()])
             found = system.blocks.coefficients(ledger.seen, bounds)
             ledger.weigh(found[FIXED : FIXED + ledger.reaches.size])
         errors = system.blocks.left_out(ledger.seen, bounds)

@@ -43,7 +43,7 @@ ALIKE = 0.1
 """Names are alike that differ by less than this part of what the best takes away, and by chance."""
 EARNED = 0.05
 """Part of what the best takes away that each further number of an entry must earn, to come first."""
-SKIPPED = ("position-force", "drive-gain", "inertia", "viscous-friction")
+SKIPPED = ("position-force", "drive-gain", "inertia", "viscous-friction", "sensor-scale")
 """Entries that take any shape, or are numbers of the stage, which are turned anyway."""
 RELEASED = 0.3
 """Part of friction's level that a fit starts from too: the rest may have been what the entry explains."""

@@ -41,9 +41,11 @@ LEAST_BESIDE = 0.03
 """and part of what those before it explain,"""
 CLEARLY, DONE = 0.6, 1.3
 """unless it explains this part of all that is there, down to so many times the floor."""
+SURE = 8.0
+"""Standard errors of what it gains, in nearly all blocks, from which on it counts beside others as well."""
 EXCHANGED = 0.93
 """Part of the error with one entry that must be left with another in its place, to take that one."""
-ENOUGH, POOR = 0.8, 0.5
+ENOUGH, POOR = 0.7, 0.5
 """Part of the excess over the floor that names must explain together, else none is given: where what is left
 depends clearly on something, and in any case."""
 
@@ -155,7 +157,11 @@ def _settles_the_rest(first: Floats, before: Floats, after: Floats, floor: Float
     left = float(max(before.sum() - floor.sum(), 0.0))
     beside = gained / max(float(first.sum() - before.sum()), 1e-300)
     done = gained > CLEARLY * float(before.sum()) and float(after.sum()) < DONE * float(floor.sum())
-    return beside > BESIDE or (gained > REST * left and (beside > LEAST_BESIDE or done))
+    each = before - after
+    steady = float(each.mean()) > SURE * float(each.std(ddof=1) / np.sqrt(each.size))
+    everywhere = steady and bool(np.mean(each > 0.05 * before) >= 0.9)
+    rest = gained > REST * left and (beside > LEAST_BESIDE or done)
+    return beside > BESIDE or rest or (beside > LEAST_BESIDE and everywhere)
 
 
 def _exchange(

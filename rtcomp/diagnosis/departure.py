@@ -24,7 +24,10 @@ def off(fitted: Fitted) -> Floats:
     if isinstance(stage.friction, MaxwellSlip):
         found = level_and_reach(list(zip(c[FIXED : FIXED + reaches.size], reaches, strict=True)))
         pairs += list(zip(found, level_and_reach(stage.friction.elements), strict=True))
-    return np.array([np.log(max(now, 1e-3 * was) / was) / USUAL if was > 0 else 0.0 for now, was in pairs])
+    logs = [np.log(max(now, 1e-3 * was) / was) / USUAL if was > 0 else 0.0 for now, was in pairs]
+    # What an entry has released says nothing for or against it.
+    free = np.isinf(fitted.bounds.high[:FIXED])
+    return np.array([0.0 if i < FIXED and free[i] else log for i, log in enumerate(logs)])
 
 
 def departure(fitted: Fitted) -> float:

@@ -9,15 +9,16 @@ from dataclasses import replace
 import numpy as np
 
 from rtcomp.diagnosis.base import Fitted, fit_base
+from rtcomp.diagnosis.certain import intervals, neighbours, retunings
 from rtcomp.diagnosis.curves import curves, left_over
 from rtcomp.diagnosis.decide import ABOVE_FLOOR, Choice, Decision
 from rtcomp.diagnosis.experiment import next_experiment
 from rtcomp.diagnosis.explain import explain
-from rtcomp.diagnosis.extend import extended_stage, level_and_reach
+from rtcomp.diagnosis.extend import extended_stage
 from rtcomp.diagnosis.floor import floor_errors
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.motion import UNSEEN, Motion, prepare
-from rtcomp.diagnosis.refine import intervals
+from rtcomp.diagnosis.refine import Refined, refine
 from rtcomp.diagnosis.result import (
     Candidate,
     Diagnosis,
@@ -25,7 +26,6 @@ from rtcomp.diagnosis.result import (
     Fit,
     Named,
     Place,
-    Retuned,
     Sight,
     Value,
     Verdict,
@@ -37,7 +37,6 @@ from rtcomp.diagnosis.told_by_position import told_by_position
 from rtcomp.errors import RtcompError
 from rtcomp.kernels import Floats
 from rtcomp.physics import catalogue
-from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
 
@@ -47,10 +46,8 @@ NEGLIGIBLE = 0.0035
 """Relative force error up to which nothing is looked for."""
 OPEN = 4.0
 """Squared error over the floor's, from which on something remains that no entry explains."""
-MOVED = 0.02
-"""Relative change of a parameter that is worth reporting."""
-MODEL = 0.005
-"""Relative half width of an interval that no amount of data removes: kernels and friction grid are models."""
+LOUD = 0.03
+"""Relative force error left by noise and method, from which on forces decide nothing where an axis sticks."""
 ROUGH = (0.75, 1.0, 1.3)
 """Factors on the believed reaches with which the place of the mismatch is looked for at first."""
 
@@ -83,10 +80,11 @@ def diagnose(
     base = fit_base(stage, motion)
     retuned_stage = extended_stage(stage, base, [])
     say(1.0, "balance")
-    unseen_sticking = mostly_hidden(stage, recordings)
-    if unseen_sticking > MUCH:
-        return told_by_position(stage, recordings, motion, base, unseen_sticking, say, seed)
     floor = floor_errors(retuned_stage, base, motion, seed + 1)
+    unseen_sticking = mostly_hidden(stage, recordings)
+    loud = float(floor.sum()) > LOUD**2 * float(base.system.blocks.power[base.ledger.seen].sum())
+    if unseen_sticking > MUCH and loud:
+        return told_by_position(stage, recordings, motion, base, unseen_sticking, say, seed)
     least = np.maximum(floor, NEGLIGIBLE**2 / ABOVE_FLOOR * base.system.blocks.power[base.ledger.seen])
     told = explain(stage, motion, base, floor, least, say, seed)
     decision, named, final, fit = told.decision, told.named, told.final, told.fit
@@ -96,8 +94,9 @@ def diagnose(
         fit = Fit(fit.before, fit.retuned, fit.before, fit.floor)
     say(0.4, "locate")
     where = locate(motion, base.residual, final.residual if named else None, seed, stage.axis)
-    effects = _effects(decision, named, base, final, least, motion)
-    retuned = _retuned(stage, final, extended)
+    beside = neighbours(stage, motion, decision.refined if final is not base else refine(base, motion, []))
+    effects = _effects(decision, named, base, final, least, motion, beside)
+    retuned = retunings(stage, final, beside, extended)
     verdict = _verdict(effects, final, floor, least, fit)
     if verdict == "consistent":
         where = []
@@ -137,17 +136,26 @@ def diagnose(
 
 
 def _effects(
-    decision: Decision, named: list[Entry], base: Fitted, final: Fitted, floor: Floats, motion: Motion
+    decision: Decision,
+    named: list[Entry],
+    base: Fitted,
+    final: Fitted,
+    floor: Floats,
+    motion: Motion,
+    beside: list[Refined],
 ) -> list[Named]:
     if not named:
         return []
     excess = max(float(base.errors.sum() - floor.sum()), 1e-300)
-    spans = intervals(decision.refined)
-    found = []
-    names = [str(e["name"]) for e in decision.refined.entries]
+    spans = intervals(decision.refined, beside)
+    found: list[Named] = []
     drawn = curves(motion, final, decision.refined.entries, final.ledger.stage.axis)
     for entry, choice in zip(named, decision.choices, strict=True):
-        at = names.index(str(entry["name"]))
+        twin = next((i for i, e in enumerate(found) if e.names == tuple(choice.names)), None)
+        if twin is not None:  # a harmonic of one that is named already
+            found[twin] = replace(found[twin], share=min(found[twin].share + choice.gain / excess, 1.0))
+            continue
+        at = next(i for i, e in enumerate(decision.refined.entries) if e["name"] == entry["name"])
         values = {}
         for parameter in catalogue.entry(str(entry["name"])).parameters:
             value = entry.get(parameter.name)
@@ -182,41 +190,6 @@ def _verdict(effects: list[Named], final: Fitted, floor: Floats, least: Floats, 
     return "consistent" if left < 100 * float(floor.sum()) else "unexplained"
 
 
-def _retuned(believed: Stage, final: Fitted, extended: Stage) -> list[Retuned]:
-    """Return the believed parameters that the fit moved, with jackknife intervals over blocks."""
-    seen = final.ledger.seen
-    members = np.flatnonzero(seen)
-    sets = [final.coefficients]
-    for k in members:
-        others = seen.copy()
-        others[k] = False
-        sets.append(final.system.blocks.coefficients(others, final.bounds))
-    reaches = final.ledger.reaches
-    rows = []
-    for c in sets:
-        elements = [(float(k), float(r)) for k, r in zip(c[3 : 3 + reaches.size], reaches, strict=True)]
-        level, reach = level_and_reach(elements)
-        rows.append([c[0], c[1], c[2], level, reach])
-    table = np.array(rows)
-    count = members.size
-    spread = np.sqrt((count - 1) / count * np.sum((table[1:] - table[1:].mean(axis=0)) ** 2, axis=0))
-    m, now = believed.mechanics, extended.mechanics
-    table[0, :2] = now.mass, now.viscous  # with what was folded into them
-    friction = believed.friction
-    own = level_and_reach(friction.elements) if isinstance(friction, MaxwellSlip) else (0.0, 0.0)
-    before = [m.mass, m.viscous, m.micro_damping, *own]
-    names = ("mass", "viscous", "micro_damping", "friction.level", "friction.reach")
-    units = ("kg", "N s/m", "N s/m", "N", "m")
-    found = []
-    for name, unit, old, new, sd in zip(names, units, before, table[0], spread, strict=True):
-        half = float(np.hypot(2.26 * sd, MODEL * new))
-        if old > 0 and abs(new / old - 1) > MOVED and abs(new - old) > half:
-            found.append(
-                Retuned(name, float(old), Value(float(new), float(new - half), float(new + half), unit))
-            )
-    return found
-
-
 def _tell_apart(
     choice: Choice, named: list[Entry], stage: Stage, final: Fitted, motion: Motion
 ) -> Experiment | None:
@@ -245,6 +218,8 @@ def _like(entry: Entry, name: str, stage: Stage) -> Entry | None:
             return {"name": name, "delay": size["delay"]}
         if name == "drive-lag" and "delay" in size:
             return {"name": name, "time_constant": size["delay"]}
+        if name == "drive-offset" and "force" in size:
+            return {"name": name, "offset": float(size["force"]) / stage.force_constant}  # type: ignore[arg-type]
         if name in ("constant-force", "gravity") and "offset" in size:
             return {"name": name, "force": float(size["offset"]) * stage.force_constant}  # type: ignore[arg-type]
         if name == "torque-ripple" and {"period", "phase"} <= set(size):

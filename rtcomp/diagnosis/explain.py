@@ -9,6 +9,7 @@ import numpy as np
 from rtcomp.diagnosis.addition import Progress
 from rtcomp.diagnosis.base import Fitted
 from rtcomp.diagnosis.decide import Choice, Decision, decide
+from rtcomp.diagnosis.departure import departure
 from rtcomp.diagnosis.extend import extended_stage
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.motion import UNSEEN, Motion
@@ -23,6 +24,8 @@ STRUCTURED = 0.3
 HARM, WORSE, HELP = 1.02, 1.1, 0.95
 """Factors on the held-out error of the stage, believed, retuned and (where it is more than the floor) retuned
 again, beyond which names are taken back."""
+STRAYED = 9.0
+"""How much further (see `departure`) than half again the retuning names may take what is believed."""
 AGAIN = 2
 """Times that names which do not hold are left out and others are looked for."""
 
@@ -69,7 +72,8 @@ def explain(
         first = str(entries[0]["name"])
         named, own, decision.choices = _fold(stage, final, entries, decision.choices)
         fit = Fit(before, plain, _held_out(own, motion), rest)
-        if not named or _holds(fit):
+        strays = departure(final) > 1.5 * departure(base) + STRAYED
+        if not named or (_holds(fit) and not strays):
             return Explanation(decision, named, entries, own, final, fit)
         without |= {first}
     # What the ledger gains must hold in the stage itself; else it is not offered as an explanation.
@@ -80,7 +84,7 @@ def explain(
 def _holds(fit: Fit) -> bool:
     """Tell whether names hold on what was put aside: they do no harm there, and help where there is need."""
     much = 1.5 * fit.floor
-    if fit.after > HARM * fit.before or fit.after > max(WORSE * fit.retuned, much):
+    if fit.after > max(HARM * fit.before, much) or fit.after > max(WORSE * fit.retuned, much):
         return False
     return fit.retuned < much or fit.after < HELP * fit.retuned
 

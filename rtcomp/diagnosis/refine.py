@@ -110,9 +110,7 @@ def at(entries: Sequence[Entry], knobs: Sequence[Knob], moved: Floats) -> list[E
     return out
 
 
-def evaluate(
-    base: Fitted, entries: Sequence[Entry], released: frozenset[str] = frozenset()
-) -> tuple[Fitted, Floats]:
+def evaluate(base: Fitted, entries: Sequence[Entry]) -> tuple[Fitted, Floats]:
     """Return the base refitted with `entries` at work, and the residual (N) of the seen rows.
 
     Errors are scaled to the drive side as believed, so that an entry which merely shrinks both sides gains
@@ -120,15 +118,15 @@ def evaluate(
     """
     ledger = base.ledger
     system = ledger.system([effect_of(e) for e in entries])
-    return fitted_with(base, ledger, system, released)
+    return fitted_with(base, ledger, system, [str(e["name"]) for e in entries])
 
 
 def fitted_with(
-    base: Fitted, ledger: Ledger, system: System, released: frozenset[str] = frozenset()
+    base: Fitted, ledger: Ledger, system: System, names: Sequence[str] = ()
 ) -> tuple[Fitted, Floats]:
     """Fit `system` and return it with the residual (N) of the rows that may be seen, scaled alike."""
     size = system.columns.shape[1]
-    bounds = bounds_of(ledger.stage, size, released=released)
+    bounds = bounds_of(ledger.stage, size, names=names)
     scale = believed_power(ledger) / max(float(system.blocks.power[ledger.seen].sum()), 1e-300)
     errors = system.blocks.left_out(ledger.seen, bounds) * scale
     fitted = Fitted(ledger, system, bounds, errors, base.scale)
@@ -148,7 +146,6 @@ def refine(
     entries: Sequence[Entry],
     which: Sequence[int] | None = None,
     tries: int = TRIES,
-    released: frozenset[str] = frozenset(),
 ) -> Refined:
     """Move the parameters of `entries` to where the residual is smallest.
 
@@ -156,7 +153,7 @@ def refine(
     """
     current = [dict(e) for e in entries]
     knobs = knobs_of(current, motion, which)
-    fitted, residual = evaluate(base, current, released)
+    fitted, residual = evaluate(base, current)
     damping = 1e-3
     belief = off(fitted)
     jacobian, away = np.zeros((residual.size, len(knobs))), np.zeros((belief.size, len(knobs)))
@@ -172,7 +169,7 @@ def refine(
                 one = np.zeros(len(knobs))
                 one[j] = way
                 try:
-                    other, left = evaluate(base, at(current, knobs, one), released)
+                    other, left = evaluate(base, at(current, knobs, one))
                 except ConfigError:
                     continue
                 slope = way * (left - residual)
@@ -189,7 +186,7 @@ def refine(
             move = np.clip(move, -30.0, 30.0)
             trial = at(current, knobs, move)
             try:
-                tried, left = evaluate(base, trial, released)
+                tried, left = evaluate(base, trial)
             except ConfigError:
                 damping *= 10.0
                 continue
@@ -208,42 +205,3 @@ def refine(
         if gained < SETTLED and float(np.max(np.abs(move))) < 1.0:
             break
     return Refined(current, fitted, knobs, jacobian, residual, away)
-
-
-MODEL = 0.004
-"""Relative half width of an interval that no data removes: kernels are models, rows are discrete."""
-
-
-def _scale(knob: Knob, value: float) -> float:
-    return 2.0 if knob.parameter.name == "phase" else abs(value)
-
-
-def intervals(refined: Refined) -> dict[tuple[int, str], tuple[float, float]]:
-    """Return the 95 % interval of every knob, by entry number and name.
-
-    From the scatter of the blocks (a sandwich over blocks), so that a residual that is alike for long does
-    not count as many samples.
-    """
-    from scipy.stats import t as student
-
-    ledger = refined.fitted.ledger
-    row = ledger.motion.period
-    times = [(i, float(e["time"])) for i, e in enumerate(refined.entries) if "time" in e]  # type: ignore[arg-type]
-    found = {(i, "time"): (t - row, t + row) for i, t in times}
-    block = ledger.block[ledger.seen[ledger.block]]
-    j, r = refined.jacobian, refined.residual
-    if not refined.knobs:
-        return found
-    gram = j.T @ j
-    blocks = np.unique(block)
-    scores = np.array([j[block == b].T @ r[block == b] for b in blocks])
-    count = blocks.size
-    meat = scores.T @ scores * count / max(count - 1, 1)
-    told = gram @ np.linalg.pinv(meat, rcond=1e-12) @ gram
-    spread = np.sqrt(np.diag(np.linalg.pinv(told + refined.away.T @ refined.away, rcond=1e-12)))
-    factor = float(student.ppf(0.975, max(count - 1, 1)))
-    for knob, sd in zip(refined.knobs, spread, strict=True):
-        value = float(refined.entries[knob.entry][knob.parameter.name])  # type: ignore[arg-type]
-        half = float(np.hypot(factor * float(sd) * knob.step, MODEL * _scale(knob, value)))
-        found[knob.entry, knob.parameter.name] = (value - half, value + half)
-    return found

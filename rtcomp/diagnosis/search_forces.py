@@ -47,10 +47,10 @@ def _by_speed(s: Scene) -> list[Column]:
         ),
         Column(
             "asymmetric-viscous-friction",
-            lambda: [np.abs(s.v)],
+            lambda: [np.abs(s.v), s.v],
             lambda c: {
                 "name": "asymmetric-viscous-friction",
-                "ratio": float(np.clip(c[0] / viscous, -50, 50)),
+                "ratio": float(np.clip(c[0] / max(viscous + c[1], 1e-9 + 0.1 * viscous), -0.95, 0.95)),
             },
         ),
     ]

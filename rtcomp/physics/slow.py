@@ -11,7 +11,7 @@ from rtcomp.physics.effect import Effect, Parameter, Place
 from rtcomp.physics.wires import GRAIN, GRIP, GRIP_STIFFNESS, MOVED, REACH, SCALE, STEP, TIME
 
 FRESH: Final = 0.1
-"""Time at rest (s) from which on the logarithm of ageing grows."""
+"""Time at rest (s) from which on the logarithm of ageing grows, unless told."""
 
 
 @effect_kernel
@@ -22,7 +22,7 @@ def friction_drift(p: Floats, s: Floats, w: Floats) -> None:
 
 @effect_kernel
 def stiction_ageing(p: Floats, s: Floats, w: Floats) -> None:
-    """p: growth (1), distance (m); s: age of the contacts (s), place (m) within the sensor's grain.
+    """p: growth (1), distance (m), onset (s); s: age of the contacts (s), place (m) within the grain.
 
     Exact for a step at constant speed.
     """
@@ -31,7 +31,7 @@ def stiction_ageing(p: Floats, s: Floats, w: Floats) -> None:
     slid = abs(inside - s[1]) / p[1]
     renewed = -math.expm1(-slid)
     s[0] += w[STEP] * (renewed / slid if slid > 1e-12 else 1.0) - s[0] * renewed
-    w[REACH] *= 1.0 + p[0] * math.log1p(s[0] / FRESH)
+    w[REACH] *= 1.0 + p[0] * math.log1p(s[0] / p[2])
 
 
 @effect_kernel
@@ -73,7 +73,7 @@ class StictionAgeing(Effect):
     """Grows with the logarithm of time at rest.
 
     The age of the contacts grows with time and is lost over the sliding `distance` (the ageing law of rate
-    and state friction); the yield level grows by `growth` for each e-fold of 1 + age / 0.1 s. Sliding at
+    and state friction); the yield level grows by `growth` for each e-fold of 1 + age / onset. Sliding at
     speed v keeps the age at distance / v, next to nothing but for the slowest motion.
     """
 
@@ -82,6 +82,7 @@ class StictionAgeing(Effect):
     parameters = (
         Parameter("growth", "1", 0.0, 10.0, "relative rise for each e-fold of time at rest"),
         Parameter("distance", "m", 0.0, 1e3, "sliding over which it fades to 1/e", open_low=True),
+        Parameter("onset", "s", 0.0, 1e3, "time at rest from which on it grows", FRESH, open_low=True),
     )
     kernel = stiction_ageing
     says = "friction at break-away grows with the logarithm of the time at rest, and fades as sliding begins"

@@ -237,9 +237,9 @@ def _scale(p: Physics, t: float, x: float, load: float) -> float:
 
 
 @compiled
-def _damping(p: Physics, x: float, v: float) -> float:
-    """Return force per speed of everything that is in proportion to speed."""
-    c = p.viscous * (p.backward_viscous if v < 0.0 else 1.0) + p.micro_damping * _bell(v, p.micro_speed)
+def _film(p: Physics, x: float, v: float) -> float:
+    """Return force per speed of everything that grows with speed, as a lubricant's film does."""
+    c = p.viscous * (p.backward_viscous if v < 0.0 else 1.0)
     if p.place_damping != 0.0:
         c += p.place_damping * _bell(x - p.place_damping_at, p.place_damping_width)
     return c + p.quadratic * abs(v)
@@ -299,7 +299,9 @@ def _run(
             speed = lagged_speed if p.friction_lag > 0.0 else vf
             level = p.level * _scale(p, t, xf, abs(drive))
             g = _slip_level(p, speed, rest)
-            force = level * g * (h - p.creep * crept) + _damping(p, xf, speed) * (speed - vf)
+            film = _film(p, xf, speed)
+            # A film follows speed late; the contacts' own damping in presliding does not.
+            force = level * g * h + film * (speed - vf)
             if p.speed_bump != 0.0:
                 bell = _bell(abs(vf) - p.speed_bump_at, p.speed_bump_width)
                 force += p.speed_bump * math.copysign(bell, vf)
@@ -307,7 +309,7 @@ def _run(
                 ratio = abs(z[XI] - z[FROM]) / p.hump_distance
                 force += p.hump * h * ratio * math.exp(1.0 - ratio)
             force = _push(p, t, xf) - force
-            damping = _damping(p, xf, speed)
+            damping = film + p.micro_damping * _bell(vf, p.micro_speed)
             between = 0.0
             if two:
                 apart = x - x2
@@ -329,12 +331,16 @@ def _run(
             x += step * v
             x2 += step * v2
             moved = step * (v2 if p.gap > 0.0 else v)
+            if p.creep != 0.0:
+                # A spring and a dashpot in series with the contact, whose own stiffness is at most this.
+                yielded = p.creep * h * p.reach / p.shape
+                slid = step * (yielded - crept) / (p.creep_time + step)
+                crept += slid
+                moved -= slid
             h = advance(
                 z, moved / g, p.reach, p.shape * (1.0 + p.skew), p.shape * (1.0 - p.skew), p.softening
             )
             if p.ageing != 0.0:
                 rest = (rest + step) / (1.0 + abs(moved) / p.ageing_distance)
-            if p.creep != 0.0:
-                crept = (crept + step * h / p.creep_time) / (1.0 + step / p.creep_time + abs(moved) / p.reach)
             n += 1
             past[n % past.size] = x

@@ -10,10 +10,11 @@ from recorded import run
 from recorded import stage as axis
 
 from rtcomp.diagnosis.base import fit_base
+from rtcomp.diagnosis.certain import intervals
 from rtcomp.diagnosis.departure import USUAL, departure, off
 from rtcomp.diagnosis.diagnose import diagnose
 from rtcomp.diagnosis.motion import prepare
-from rtcomp.diagnosis.refine import intervals, refine
+from rtcomp.diagnosis.refine import refine
 from rtcomp.kernels import Floats
 
 
@@ -45,7 +46,7 @@ def test_a_gain_is_estimated_as_well_as_the_belief_allows() -> None:
     motion = prepare(believed, [run(true, reference())])
     base = fit_base(believed, motion)
     refined = refine(base, motion, [{"name": "drive-gain", "gain": 0.85}])
-    low, high = intervals(refined)[0, "gain"]
+    low, high = intervals(refined, [])[0, "gain"]
     assert low < 0.75 < high
     assert 0.02 < high - low < 0.4
 

@@ -72,8 +72,7 @@ def _resonance(chance: np.random.Generator, rig: Rig) -> Sized:
             "second_stiffness": second * omega**2,
             "second_damping": 2.0 * damping * omega * second,
         }
-        ratio = share / (1.0 - share)
-        return changes, {"frequency": frequency, "damping": damping, "mass_ratio": ratio}
+        return changes, {"frequency": frequency, "damping": damping, "mass_ratio": share}
 
     return Sized(at, 0.05, 4.0)
 
