@@ -116,7 +116,9 @@ def test_prove(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     figures = {f["name"]: f for f in content["figures"]}
     assert figures["right, all cases"]["count"] == 8
     assert figures["diagnosis failed"]["value"] == 0.0
-    assert figures["made worse"]["count"] == 8
+    assert figures["made worse"]["count"] == 8 and figures["made worse"]["value"] == 0.0
+    assert figures["false alarm on clean"]["value"] == 0.0
+    assert figures["right, all cases"]["value"] >= 0.6
 
 
 @pytest.mark.slow
