@@ -4,7 +4,8 @@
 
 Time and memory are those of the installed command, from the start of its process: until the place of the
 mismatch stands on the terminal, and until the end. `--minutes 60` adds an hour at 10 kHz. DATA holds
-`sealed-dev` (cases with answers.json) and `real/emps/DATA_EMPS.mat`; what is not there is skipped.
+`sealed-dev` (cases with answers.json), `real/emps/DATA_EMPS.mat` and
+`real/heads-yaw/yaw_sine_to_330s.csv.gz`; what is not there is skipped.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from rtcomp.diagnosis.diagnose import diagnose
 from rtcomp.diagnosis.result import Diagnosis
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
+from rtcomp.jobs.identify import identify
 from rtcomp.jobs.replay import replay
 from rtcomp.jobs.simulate import closed_loop
 from rtcomp.recording.reader import read
@@ -91,6 +93,25 @@ def emps(path: Path) -> list[Figure]:
         Figure("EMPS: force error as believed", 100 * fit.before, "%", "", "held-out parts"),
         Figure("EMPS: retuned", 100 * fit.retuned, "%"),
         Figure("EMPS: extended", 100 * fit.after, "%", "<= 3.11", named),
+    ]
+
+
+def yaw(path: Path) -> list[Figure]:
+    """From the Maxwell-slip model that rtcomp identifies on the smaller amplitudes, what differs on all."""
+    config = Configuration.load(shipped("heads_yaw.yaml"))
+    data = read(path, config.run.recording.map)
+    model = identify(config, data).model.to_dict()
+    friction = {key: model[key] for key in ("model", "widths", "weights")}
+    stage = config.stage.with_changes(stage={"friction": friction})
+    belief = {**stage.to_dict(), "sensor": {"noise": 5e-6, "resolution": 2.4e-5}}
+    done = diagnose(Stage.from_dict(belief), [data])
+    named = ", ".join(" or ".join(e.names) for e in done.effects) or done.verdict
+    fit = done.fit
+    return [
+        Figure("heads-yaw: force error as identified", 100 * fit.before, "%", "", "held-out parts"),
+        Figure("heads-yaw: retuned", 100 * fit.retuned, "%"),
+        Figure("heads-yaw: extended", 100 * fit.after, "%", "", named),
+        Figure("heads-yaw: noise alone", 100 * fit.floor, "%"),
     ]
 
 
@@ -180,6 +201,8 @@ def main(data: Path | None, seconds: float, minutes: int, path: Path | None) -> 
             figures += fast(Path(folder), minutes)
     if data is not None and (data / "real/emps/DATA_EMPS.mat").is_file():
         figures += emps(data / "real/emps/DATA_EMPS.mat")
+    if data is not None and (data / "real/heads-yaw/yaw_sine_to_330s.csv.gz").is_file():
+        figures += yaw(data / "real/heads-yaw/yaw_sine_to_330s.csv.gz")
     if data is not None and (data / "sealed-dev/answers.json").is_file():
         figures += sealed(data / "sealed-dev")
     show("Diagnosis", figures, path)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtcomp.diagnosis.addition import Progress
+from rtcomp.diagnosis.alike import SHAPELESS
 from rtcomp.diagnosis.base import Fitted
 from rtcomp.diagnosis.decide import Choice, Decision, decide
 from rtcomp.diagnosis.departure import departure
@@ -72,7 +73,8 @@ def explain(
         first = str(entries[0]["name"])
         named, own, decision.choices = _fold(stage, final, entries, decision.choices)
         fit = Fit(before, plain, _held_out(own, motion), rest)
-        strays = departure(final) > 1.5 * departure(base) + STRAYED
+        shaped = any(str(e["name"]) not in SHAPELESS for e in entries)
+        strays = shaped and departure(final) > 1.5 * departure(base) + STRAYED
         if not named or (_holds(fit) and not strays):
             return Explanation(decision, named, entries, own, final, fit)
         without |= {first}

@@ -1,7 +1,8 @@
 """The floor: what sensor noise, resolution and the method itself leave when nothing is missing.
 
 The explanation at hand is simulated in closed loop along the recorded reference, with the believed sensor,
-and put through the identical analysis. Where that cannot be done the sensor's noise alone is reckoned with.
+and put through the identical analysis. Where that cannot be done the recorded motion is read once more, with
+fresh noise.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from rtcomp.diagnosis.base import Fitted, bounds_of
+from rtcomp.diagnosis.blocks import Blocks
 from rtcomp.diagnosis.ledger import Ledger
 from rtcomp.diagnosis.motion import Motion, Strip, unstepped
 from rtcomp.errors import RtcompError
@@ -31,7 +33,7 @@ def floor_errors(stage: Stage, fitted: Fitted, motion: Motion, seed: int = 1) ->
     power = fitted.system.blocks.power[seen]
     method = METHOD**2 * power
     if twin is None:
-        return np.asarray(method + _sensor_power(stage, motion) * _rows(ledger)[seen])
+        return np.asarray(method + _shaken(fitted, motion, seed))
     other = Ledger(stage, twin, ledger.reaches, ledger.known)
     system = other.system(stage_effects(stage, ledger))
     bounds = bounds_of(stage, system.columns.shape[1], slack=0.3)
@@ -48,22 +50,31 @@ def stage_effects(stage: Stage, ledger: Ledger) -> list:  # type: ignore[type-ar
     return [effect_of(e) for e in stage.mechanics.effects if e not in known]
 
 
-def _rows(ledger: Ledger) -> np.ndarray:
-    return np.bincount(ledger.block, minlength=ledger.seen.size).astype(np.float64)
+def _shaken(fitted: Fitted, motion: Motion, seed: int) -> np.ndarray:
+    """Return the squared error (N^2) of every seen block that noise makes along the recorded motion.
 
-
-def _sensor_power(stage: Stage, motion: Motion) -> float:
-    """Return the mean square (N^2) of the force that position noise pretends below the cut."""
-    noise = float(np.hypot(stage.sensor.noise, stage.sensor.resolution / np.sqrt(12.0)))
-    band = motion.cut / (2.5 * motion.rate)
-    inertia = stage.mass * (2 * np.pi * motion.cut) ** 2 * noise * np.sqrt(band)
-    friction = stage.friction
-    spring = (
-        (friction.stiffness() if friction is not None else 0.0)
-        * noise
-        * np.sqrt(2 * motion.cut / motion.rate)
-    )
-    return float(inertia**2 + spring**2)
+    The force that the fit needs along the motion as recorded is fitted anew along the same motion read once
+    more: with fresh noise and rounding.
+    """
+    ledger = fitted.ledger
+    sensor = ledger.stage.sensor
+    random = np.random.default_rng(seed)
+    fewer = 1.0 / np.sqrt(motion.averaged)
+    strips: list[Strip] = []
+    for strip in motion.strips:
+        rows = strip.position.size
+        read = sensor.noise * random.standard_normal(rows) + sensor.resolution * random.uniform(
+            -0.5, 0.5, rows
+        )
+        position = strip.position + fewer * read
+        if motion.coarse:
+            position = unstepped(position, motion.cut, motion.rate)
+        strips.append(replace(strip, position=position))
+    other = Ledger(ledger.stage, replace(motion, strips=strips), ledger.reaches, ledger.known)
+    columns = other.system().columns
+    needed = fitted.system.columns @ fitted.coefficients
+    blocks = Blocks.of(columns, needed, ledger.block, ledger.seen.size)
+    return blocks.left_out(ledger.seen, fitted.bounds)
 
 
 def _twin(stage: Stage, motion: Motion, seed: int) -> Motion | None:

@@ -1,0 +1,40 @@
+"""The floor: with a controller and without one, it is what noise leaves of a recording in which all is right."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from recorded import STAGE, run
+from test_alike import reference
+
+from rtcomp.diagnosis.base import fit_base
+from rtcomp.diagnosis.floor import floor_errors
+from rtcomp.diagnosis.motion import prepare
+from rtcomp.stage.stage import Stage
+
+
+@pytest.mark.parametrize("controlled", [True, False])
+@pytest.mark.parametrize("noise", [1.5e-8, 1e-7])
+def test_the_floor_is_what_noise_leaves(controlled: bool, noise: float) -> None:
+    data: dict[str, Any] = {**STAGE, "sensor": {"noise": noise, "resolution": 1e-8}}
+    axis = Stage.from_dict(data)
+    recording = run(axis, reference())
+    if not controlled:
+        axis = Stage.from_dict({k: v for k, v in data.items() if k != "controller"})
+    motion = prepare(axis, [recording])
+    fitted = fit_base(axis, motion)
+    floor = floor_errors(axis, fitted, motion)
+    assert floor.shape == fitted.errors.shape
+    assert 0.2 < float(fitted.errors.sum() / floor.sum()) < 2.0
+
+
+def test_without_noise_the_method_alone_is_left() -> None:
+    data: dict[str, Any] = {**STAGE, "sensor": {"noise": 0.0, "resolution": 0.0}}
+    axis = Stage.from_dict({k: v for k, v in data.items() if k != "controller"})
+    motion = prepare(axis, [run(Stage.from_dict(data), reference())])
+    fitted = fit_base(axis, motion)
+    power = fitted.system.blocks.power[fitted.ledger.seen].sum()
+    floor = floor_errors(axis, fitted, motion)
+    assert np.sqrt(floor.sum() / power) == pytest.approx(0.0015, rel=0.5)
