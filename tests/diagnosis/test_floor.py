@@ -1,4 +1,4 @@
-"""The floor: with a controller and without one, it is what noise leaves of a recording in which all is right."""
+"""The floor: with a controller and without one, it is what noise leaves where all is right."""
 
 from __future__ import annotations
 
