@@ -21,8 +21,9 @@ from rtcomp.kernels import Floats
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.stage.stage import Stage
 
-MODEL = 0.006
-"""Relative half width of an interval that no data removes: kernels are models, rows are discrete."""
+MODEL = 0.015
+"""Relative half width of an interval that no data removes: kernels are models, rows are discrete. As much as
+trials' plants of other physics were missed by where all else was certain."""
 BESIDE = (0.85, 1.18)
 """Factors on the reaches of the grids that a fit is held against."""
 MOVED = 0.02
@@ -41,13 +42,24 @@ def neighbours(stage: Stage, motion: Motion, refined: Refined) -> list[Refined]:
     return found
 
 
+def birge(final: Fitted, floor: Floats) -> float:
+    """Return the factor on every interval by which a fit is worse than noise, at least 1.
+
+    Where something is left that no noise leaves, the model is not quite the physics, and its numbers are as
+    far off as that; Birge (1932), Physical Review 40.
+    """
+    return max(1.0, float(np.sqrt(final.errors.sum() / max(float(floor.sum()), 1e-300))))
+
+
 def _weight(best: Fitted, other: Fitted) -> float:
     """Return how much a fit beside counts: less, the worse it is."""
     return min(float(best.errors.sum()) / max(float(other.errors.sum()), 1e-300), 1.0)
 
 
-def intervals(refined: Refined, beside: Sequence[Refined]) -> dict[tuple[int, str], tuple[float, float]]:
-    """Return the 95 % interval of every knob of `refined`, by entry number and name."""
+def intervals(
+    refined: Refined, beside: Sequence[Refined], worse: float = 1.0
+) -> dict[tuple[int, str], tuple[float, float]]:
+    """Return the 95 % interval of every knob of `refined`, by entry number and name; see `birge` for `worse`."""
     from scipy.stats import t as student
 
     ledger = refined.fitted.ledger
@@ -75,7 +87,7 @@ def intervals(refined: Refined, beside: Sequence[Refined]) -> dict[tuple[int, st
             default=0.0,
         )
         size = 2.0 if knob.parameter.name == "phase" else abs(value)
-        half = float(np.sqrt((factor * sd * knob.step) ** 2 + grid**2 + (MODEL * size) ** 2))
+        half = worse * float(np.sqrt((factor * sd * knob.step) ** 2 + grid**2 + (MODEL * size) ** 2))
         found[knob.entry, knob.parameter.name] = (value - half, value + half)
     return found
 
@@ -90,7 +102,9 @@ def _apart(knob: Knob, one: float, other: float) -> float:
     return abs(one - other)
 
 
-def retunings(believed: Stage, final: Fitted, beside: Sequence[Refined], extended: Stage) -> list[Retuned]:
+def retunings(
+    believed: Stage, final: Fitted, beside: Sequence[Refined], extended: Stage, worse: float = 1.0
+) -> list[Retuned]:
     """Return the believed parameters that the fit moved, with their 95 % intervals."""
     seen = final.ledger.seen
     members = np.flatnonzero(seen)
@@ -116,7 +130,7 @@ def retunings(believed: Stage, final: Fitted, beside: Sequence[Refined], extende
     found = []
     for i, (name, unit, old) in enumerate(zip(names, units, before, strict=True)):
         new = float(table[0, i])
-        half = float(np.sqrt((WIDE * spread[i]) ** 2 + grid[i] ** 2 + (MODEL * new) ** 2))
+        half = worse * float(np.sqrt((WIDE * spread[i]) ** 2 + grid[i] ** 2 + (MODEL * new) ** 2))
         if i < 3 and old > 0 and abs(abs(new / old - 1.0) / BELIEVED - 1.0) < 0.05:
             half = max(half, BELIEVED * old)  # held there by the belief, not by the recording
         if old > 0 and abs(new / old - 1) > MOVED and abs(new - old) > half:

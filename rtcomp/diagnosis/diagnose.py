@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from rtcomp.diagnosis.base import Fitted, fit_base
-from rtcomp.diagnosis.certain import intervals, neighbours, retunings
+from rtcomp.diagnosis.certain import birge, intervals, neighbours, retunings
 from rtcomp.diagnosis.curves import curves, left_over
 from rtcomp.diagnosis.decide import ABOVE_FLOOR, Choice, Decision
 from rtcomp.diagnosis.experiment import next_experiment
@@ -96,7 +96,7 @@ def diagnose(
     where = locate(motion, base.residual, final.residual if named else None, seed, stage.axis)
     beside = neighbours(stage, motion, decision.refined if final is not base else refine(base, motion, []))
     effects = _effects(decision, named, base, final, least, motion, beside)
-    retuned = retunings(stage, final, beside, extended)
+    retuned = retunings(stage, final, beside, extended, birge(final, least))
     verdict = _verdict(effects, final, floor, least, fit)
     if verdict == "consistent":
         where = []
@@ -147,7 +147,7 @@ def _effects(
     if not named:
         return []
     excess = max(float(base.errors.sum() - floor.sum()), 1e-300)
-    spans = intervals(decision.refined, beside)
+    spans = intervals(decision.refined, beside, birge(final, floor))
     found: list[Named] = []
     drawn = curves(motion, final, decision.refined.entries, final.ledger.stage.axis)
     for entry, choice in zip(named, decision.choices, strict=True):

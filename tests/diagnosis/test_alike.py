@@ -10,7 +10,7 @@ from recorded import run
 from recorded import stage as axis
 
 from rtcomp.diagnosis.base import fit_base
-from rtcomp.diagnosis.certain import intervals
+from rtcomp.diagnosis.certain import birge, intervals, neighbours
 from rtcomp.diagnosis.departure import USUAL, departure, off
 from rtcomp.diagnosis.diagnose import diagnose
 from rtcomp.diagnosis.motion import prepare
@@ -65,3 +65,22 @@ def test_scaled_numbers_are_told_apart_by_what_they_leave_as_believed(
         assert not found.effects
     else:
         assert [e.names for e in found.effects] == [(name,)]
+
+
+def test_intervals_grow_with_what_is_left_and_with_what_the_grid_decides() -> None:
+    true, believed = axis(effects=[{"name": "parallel-spring", "stiffness": 3e3}]), axis()
+    motion = prepare(believed, [run(true, reference())])
+    base = fit_base(believed, motion)
+    refined = refine(base, motion, [{"name": "parallel-spring", "stiffness": 1e3}])
+
+    def width(**more: object) -> float:
+        low, high = intervals(refined, **{"beside": [], **more})[0, "stiffness"]  # type: ignore[arg-type]
+        assert low < 3e3 < high
+        return high - low
+
+    plain = width()
+    assert width(worse=3.0) == pytest.approx(3.0 * plain)
+    assert width(beside=neighbours(believed, motion, refined)) >= plain
+    floor = refined.fitted.errors
+    assert birge(refined.fitted, floor) == 1.0 and birge(refined.fitted, 4.0 * floor) == 1.0
+    assert birge(refined.fitted, 0.25 * floor) == pytest.approx(2.0)
