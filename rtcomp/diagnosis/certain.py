@@ -59,7 +59,7 @@ def _weight(best: Fitted, other: Fitted) -> float:
 def intervals(
     refined: Refined, beside: Sequence[Refined], worse: float = 1.0
 ) -> dict[tuple[int, str], tuple[float, float]]:
-    """Return the 95 % interval of every knob of `refined`, by entry number and name; see `birge` for `worse`."""
+    """Return the 95 % interval of every knob, by entry number and name; `worse` widens them (`birge`)."""
     from scipy.stats import t as student
 
     ledger = refined.fitted.ledger
