@@ -48,6 +48,8 @@ OPEN = 4.0
 """Squared error over the floor's, from which on something remains that no entry explains."""
 LOUD = 0.03
 """Relative force error left by noise and method, from which on forces decide nothing where an axis sticks."""
+KEPT = 0.9
+"""Factor on the held-out error below which a retuned stage is given in place of the believed one."""
 ROUGH = (0.75, 1.0, 1.3)
 """Factors on the believed reaches with which the place of the mismatch is looked for at first."""
 
@@ -89,7 +91,7 @@ def diagnose(
     told = explain(stage, motion, base, floor, least, say, seed)
     decision, named, final, fit = told.decision, told.named, told.final, told.fit
     extended, entries_found = told.stage, told.entries
-    if not named and fit.before <= fit.after:
+    if not named and fit.after > KEPT * fit.before:
         extended = stage
         fit = Fit(fit.before, fit.retuned, fit.before, fit.floor)
     say(0.4, "locate")
