@@ -16,10 +16,10 @@ import click
 import numpy as np
 from figures_table import Figure, show
 
+from rtcomp.diagnosis.by_position.windows import Windows, windows_of
 from rtcomp.diagnosis.diagnose import diagnose
 from rtcomp.diagnosis.motion import prepare
 from rtcomp.diagnosis.result import Diagnosis
-from rtcomp.diagnosis.shooting import Windows, windows_of
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
 from rtcomp.jobs.simulate import on_reference

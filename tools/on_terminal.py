@@ -8,7 +8,9 @@ import pty
 import struct
 import termios
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -23,13 +25,21 @@ class Shown:
     """Largest resident memory of the process."""
 
 
-def on_terminal(command: list[str], *words: str) -> Shown:
-    """Run a command on a terminal of 40 lines and 110 columns; raise RuntimeError where it fails."""
+def on_terminal(
+    command: list[str],
+    *words: str,
+    at: Path | None = None,
+    environment: Mapping[str, str] | None = None,
+    columns: int = 110,
+) -> Shown:
+    """Run a command in the folder `at` on a terminal of 40 lines; raise RuntimeError where it fails."""
     began = time.perf_counter()
     pid, terminal = pty.fork()
     if pid == 0:
-        os.execv(command[0], command)
-    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 110, 0, 0))
+        if at is not None:
+            os.chdir(at)
+        os.execve(command[0], command, os.environ if environment is None else environment)
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
     shown, when = b"", {}
     while True:
         try:

@@ -6,19 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rtcomp.diagnosis.periodogram import FINE, Bins
 from rtcomp.kernels import Floats
 from rtcomp.units import prefixed
 
-CELLS = 4096
-"""Stretches that the stroke is cut into for the search."""
-FINEST = CELLS // 8
+FINEST = 512
 """Periods in the stroke, at the most."""
 COARSEST = 2.5
 """Periods in the stroke, at the least: below, it is a slope or a bend."""
 STEADY = 0.4
 """Part of its amplitude that a wave has in either half of the rows along the stroke."""
-_FINER = 4
-"""Trial periods between one whole number of them in the stroke and the next."""
 
 
 @dataclass(frozen=True)
@@ -53,19 +50,17 @@ def wave(x: Floats, direction: Floats, speed: Floats, residual: Floats, shifts: 
     """Return the wave along `x` (m) that most of `residual` (N) follows; all (n,), `direction` -1, 0 or 1.
 
     Its significance is that of the strongest wave of all after the residual was shifted in a circle by each
-    of `shifts` rows. None where the stroke is nothing, or no wave
-    goes all along it.
+    of `shifts` rows. None where the stroke is nothing, or no wave goes all along it.
     """
-    low, span = float(x.min()), float(np.ptp(x))
+    span = float(np.ptp(x))
     if not span > 0.0:
         return None
-    cells = np.minimum(((x - low) / span * CELLS).astype(np.int64), CELLS - 1)
+    bins = Bins(x, span)
     power = max(float(residual @ residual), 1e-300)
-    first = int(np.ceil(COARSEST * _FINER))
+    first = int(np.ceil(COARSEST * FINE))
 
     def spectrum(signed: Floats) -> Floats:
-        sums = np.bincount(cells, weights=signed, minlength=CELLS)
-        lines = np.fft.rfft(sums, _FINER * CELLS)[first : _FINER * FINEST]
+        lines = bins.lines(signed)[first : FINE * FINEST]
         return np.asarray(2.0 * np.abs(lines) ** 2 / (x.size * power))
 
     even, odd = spectrum(residual), spectrum(residual * direction)
@@ -75,8 +70,8 @@ def wave(x: Floats, direction: Floats, speed: Floats, residual: Floats, shifts: 
     p = (1.0 + float(np.count_nonzero(null >= chosen.max()))) / (null.size + 1.0)
     # Rows are not spread evenly over the stroke: the share is that of a fit, and the period refined by it.
     signed = residual * direction if is_odd else residual
-    count = (first + int(np.argmax(chosen))) / _FINER
-    trials = [_fitted(x, signed, span / c) for c in count + np.linspace(-0.5, 0.5, 41) / _FINER * 2]
+    count = (first + int(np.argmax(chosen))) / FINE
+    trials = [_fitted(x, signed, span / c) for c in count + np.linspace(-0.5, 0.5, 41) / FINE * 2]
     explained, period, coefficients = max(trials)
     angle = 2 * np.pi * x / period
     basis = coefficients[0] * np.cos(angle) + coefficients[1] * np.sin(angle)

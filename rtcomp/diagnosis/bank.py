@@ -15,29 +15,10 @@ import numpy as np
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics import Effect
 from rtcomp.physics.maxwell_slip import MaxwellSlip
-from rtcomp.physics.program import Program, run_chain
+from rtcomp.physics.program import Program, renew, run_chain
 from rtcomp.physics.speed import MicroDamping, ViscousFriction
-from rtcomp.physics.wires import (
-    ACCELERATION,
-    COUNT,
-    DRIVE,
-    FRICTION,
-    GAIN,
-    GRAIN,
-    GRIP,
-    GRIP_LEVEL,
-    GRIP_STIFFNESS,
-    MASS,
-    MOVED,
-    POSITION,
-    PUSH,
-    REACH,
-    SCALE,
-    STEP,
-    TIME,
-    VELOCITY,
-    VOLTS,
-)
+from rtcomp.physics.wires import COUNT, FRICTION, GRAIN, GRIP, GRIP_LEVEL, GRIP_STIFFNESS
+from rtcomp.stage.balance import along_row
 from rtcomp.stage.stage import Stage
 
 SPEED_UNITS = 2
@@ -102,19 +83,9 @@ def _along(
         level += weights[i] * reaches[i]
         stiffness += weights[i]
     for k in range(motion.shape[0]):
-        last = max(k - 1, 0)
         for j in range(1, parts + 1):
-            share = 1.0 - j / parts
-            w[TIME] = motion[k, 0] + share * (motion[last, 0] - motion[k, 0])
-            w[STEP] = (motion[k, 0] - motion[last, 0]) / parts
-            w[POSITION] = motion[k, 1] + share * (motion[last, 1] - motion[k, 1])
-            w[MOVED] = (motion[k, 1] - motion[last, 1]) / parts
-            w[VELOCITY] = motion[k, 2] + share * (motion[last, 2] - motion[k, 2])
-            w[ACCELERATION] = motion[k, 3]
-            w[VOLTS] = motion[k, 4]
-            w[MASS], w[GAIN] = base[0], base[1]
-            w[DRIVE] = w[PUSH] = w[FRICTION] = 0.0
-            w[REACH] = w[SCALE] = 1.0
+            along_row(w, motion, k, j, parts)
+            renew(w, base[0], base[1])
             w[GRIP_LEVEL], w[GRIP_STIFFNESS] = level, stiffness
             run_chain(steps, p, s, w, 0, first)
             total = 0.0

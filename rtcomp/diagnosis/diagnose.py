@@ -9,6 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from rtcomp.diagnosis.base import Fitted, fit_base
+from rtcomp.diagnosis.by_position.sticking import MUCH, mostly_hidden
+from rtcomp.diagnosis.by_position.told import told_by_position
 from rtcomp.diagnosis.certain import birge, intervals, neighbours, retunings
 from rtcomp.diagnosis.curves import curves, left_over
 from rtcomp.diagnosis.decide import ABOVE_FLOOR, Choice, Decision
@@ -32,8 +34,6 @@ from rtcomp.diagnosis.result import (
 )
 from rtcomp.diagnosis.scene import Entry
 from rtcomp.diagnosis.sight import pinned, sight
-from rtcomp.diagnosis.sticking import MUCH, mostly_hidden
-from rtcomp.diagnosis.told_by_position import told_by_position
 from rtcomp.errors import RtcompError
 from rtcomp.kernels import Floats
 from rtcomp.physics import catalogue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from rtcomp.kernels import Floats
 
@@ -11,26 +12,33 @@ FINE = 5
 """Waves tried for each whole number of them in the span."""
 
 
+class Bins:
+    """Positions `x` (K,) within `span` (m), shared out to bins: waves along them are Fourier lines."""
+
+    def __init__(self, x: Floats, span: float) -> None:
+        at = (x - x.min()) / span * BINS
+        self._low = np.floor(at).astype(np.int64)
+        self._part = at - self._low
+
+    def lines(self, values: Floats) -> npt.NDArray[np.complex128]:
+        """Return the sums of `values` (K,) times exp(-2 pi i n x / span) for n = 0, 1 / FINE, 2 / FINE ..."""
+        bins = np.bincount(self._low, values * (1.0 - self._part), BINS + 2)
+        bins += np.bincount(self._low + 1, values * self._part, BINS + 2)
+        return np.fft.rfft(bins, FINE * BINS)
+
+
 def periodogram(
     x: Floats, span: float, weight: Floats, residual: Floats, most: float
 ) -> tuple[Floats, Floats]:
     """Return numbers of waves in `span` (m), and how much squared `residual` each explains alone (N^2).
 
     Waves are sines and cosines of position `x` (m, (K,)) times `weight` (K,); their numbers go up in fifths
-    to `most`. Positions are shared out to bins, so that all of it is a few Fourier transforms.
+    to `most`.
     """
-    at = (x - x.min()) / span * BINS
-    low = np.floor(at).astype(np.int64)
-    part = at - low
-
-    def spectrum(values: Floats) -> np.ndarray:
-        bins = np.bincount(low, values * (1.0 - part), BINS + 2)
-        bins += np.bincount(low + 1, values * part, BINS + 2)
-        return np.asarray(np.fft.rfft(bins, FINE * BINS))
-
+    bins = Bins(x, span)
     count = min(int(most * FINE), BINS)
     k = np.arange(1, count + 1)
-    projected, squared = spectrum(weight * residual)[k], spectrum(weight**2)
+    projected, squared = bins.lines(weight * residual)[k], bins.lines(weight**2)
     # Of the squared waves: half the weight's square, more or less what it has at twice the number.
     half, double = 0.5 * squared[0].real, 0.5 * squared[2 * k].real
     least = 1e-9 * half + 1e-300

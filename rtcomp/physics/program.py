@@ -8,6 +8,7 @@ import numpy as np
 
 from rtcomp.kernels import Floats, call_effect, compiled
 from rtcomp.physics.effect import Effect, Place
+from rtcomp.physics.wires import DRIVE, FRICTION, GAIN, MASS, PUSH, REACH, SCALE
 
 COUNT, DRIVES, LINKS = 0, 1, 2
 """Places in a program: number of effects, how many of them (the first) are the drive's, then for each
@@ -30,6 +31,14 @@ class Program:
         # One spare number each, so that an effect without parameters or state still has an address.
         self.p: Floats = np.concatenate([*vectors, np.zeros(1)])
         self.s: Floats = np.concatenate([*states, np.zeros(1)])
+
+
+@compiled
+def renew(w: Floats, mass: float, gain: float) -> None:
+    """Put the wires that a whole chain writes anew to where they begin: nothing acts yet."""
+    w[MASS], w[GAIN] = mass, gain
+    w[DRIVE] = w[PUSH] = w[FRICTION] = 0.0
+    w[REACH] = w[SCALE] = 1.0
 
 
 @compiled

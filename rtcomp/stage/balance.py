@@ -16,19 +16,16 @@ import numpy as np
 
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics import Effect, Place, wires
-from rtcomp.physics.program import Program, run_chain
+from rtcomp.physics.program import Program, renew, run_chain
 from rtcomp.physics.wires import (
     ACCELERATION,
     DRIVE,
     FRICTION,
-    GAIN,
     GRAIN,
     MASS,
     MOVED,
     POSITION,
     PUSH,
-    REACH,
-    SCALE,
     SENSED,
     STEP,
     TIME,
@@ -100,25 +97,32 @@ def forces(
 
 
 @compiled
+def along_row(w: Floats, motion: Floats, k: int, j: int, parts: int) -> None:
+    """Put the wires to the end of part `j` of `parts` of row `k` of a motion.
+
+    `motion` is (K, 5): time (s), position (m), velocity, acceleration, the command held up to each row (V).
+    """
+    before = max(k - 1, 0)
+    share = 1.0 - j / parts
+    w[TIME] = motion[k, 0] + share * (motion[before, 0] - motion[k, 0])
+    w[STEP] = (motion[k, 0] - motion[before, 0]) / parts
+    w[POSITION] = motion[k, 1] + share * (motion[before, 1] - motion[k, 1])
+    w[MOVED] = (motion[k, 1] - motion[before, 1]) / parts
+    w[VELOCITY] = motion[k, 2] + share * (motion[before, 2] - motion[k, 2])
+    w[ACCELERATION] = motion[k, 3]
+    w[VOLTS] = motion[k, 4]
+
+
+@compiled
 def _along(
     steps: np.ndarray, p: Floats, s: Floats, w: Floats, base: Floats, motion: Floats, parts: int, out: Floats
 ) -> None:
     """Fill `out`: the mean of the drive's force over the row's parts, the rest as it is at the row's end."""
     for k in range(motion.shape[0]):
-        before = max(k - 1, 0)
         drive = 0.0
         for j in range(1, parts + 1):
-            share = 1.0 - j / parts
-            w[TIME] = motion[k, 0] + share * (motion[before, 0] - motion[k, 0])
-            w[STEP] = (motion[k, 0] - motion[before, 0]) / parts
-            w[POSITION] = motion[k, 1] + share * (motion[before, 1] - motion[k, 1])
-            w[MOVED] = (motion[k, 1] - motion[before, 1]) / parts
-            w[VELOCITY] = motion[k, 2] + share * (motion[before, 2] - motion[k, 2])
-            w[ACCELERATION] = motion[k, 3]
-            w[VOLTS] = motion[k, 4]
-            w[MASS], w[GAIN] = base[0], base[1]
-            w[DRIVE] = w[PUSH] = w[FRICTION] = 0.0
-            w[REACH] = w[SCALE] = 1.0
+            along_row(w, motion, k, j, parts)
+            renew(w, base[0], base[1])
             run_chain(steps, p, s, w, 0, steps[0])
             drive += w[DRIVE] / parts
         out[0, k], out[1, k], out[2, k], out[3, k] = drive, w[PUSH], w[FRICTION], w[MASS]

@@ -14,18 +14,15 @@ import numpy as np
 
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics import Place, wires
-from rtcomp.physics.program import COUNT, Program, run_chain
+from rtcomp.physics.program import COUNT, Program, renew, run_chain
 from rtcomp.physics.wires import (
     ACCELERATION,
     DRIVE,
     FRICTION,
-    GAIN,
     MASS,
     MOVED,
     POSITION,
     PUSH,
-    REACH,
-    SCALE,
     STEP,
     TIME,
     VELOCITY,
@@ -90,12 +87,14 @@ def _shoot(
         w[MOVED] = motion[k, 1] - motion[last, 1]
         w[ACCELERATION] = (motion[k, 2] - motion[last, 2]) / period
         w[VOLTS] = motion[last, 3]
-        _all(steps, p, s, w, base)
+        renew(w, base[0], base[1])
+        run_chain(steps, p, s, w, 0, steps[COUNT])
         while window < starts.size and starts[window] == k:
             free, wires_free, base_free = s.copy(), w.copy(), base.copy()
             wires_free[STEP] = wires_free[MOVED] = 0.0
             wires_free[VOLTS] = motion[k, 3]
-            _all(steps, p, free, wires_free, base)
+            renew(wires_free, base[0], base[1])
+            run_chain(steps, p, free, wires_free, 0, steps[COUNT])
             force = wires_free[DRIVE] + wires_free[PUSH] - wires_free[FRICTION]
             wires_free[ACCELERATION] = force / wires_free[MASS]
             for i in range(out.shape[1]):
@@ -103,11 +102,3 @@ def _shoot(
                 if i + 1 < out.shape[1]:
                     integrate(steps, p, free, wires_free, base_free, motion[k + i, 3], period, count)
             window += 1
-
-
-@compiled
-def _all(steps: np.ndarray, p: Floats, s: Floats, w: Floats, base: Floats) -> None:
-    w[MASS], w[GAIN] = base[0], base[1]
-    w[DRIVE] = w[PUSH] = w[FRICTION] = 0.0
-    w[REACH] = w[SCALE] = 1.0
-    run_chain(steps, p, s, w, 0, steps[COUNT])

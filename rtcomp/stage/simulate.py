@@ -17,7 +17,7 @@ import numpy as np
 
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics import Place, wires
-from rtcomp.physics.program import COUNT, DRIVES, Program, run_chain
+from rtcomp.physics.program import COUNT, DRIVES, Program, renew, run_chain
 from rtcomp.physics.wires import (
     ACCELERATION,
     DRIVE,
@@ -80,10 +80,7 @@ def integrate(
         w[VELOCITY] = half + kick  # predicted; corrected below
         w[ACCELERATION] = a
         w[VOLTS] = volts
-        w[GAIN] = base[1]
-        w[MASS] = base[0]
-        w[DRIVE] = w[PUSH] = w[FRICTION] = 0.0
-        w[REACH] = w[SCALE] = 1.0
+        renew(w, base[0], base[1])
         run_chain(steps, p, s, w, 0, effects)
         a = (w[DRIVE] + w[PUSH] - w[FRICTION]) / w[MASS]
         if moved != 0.0:

@@ -1,4 +1,4 @@
-"""Rivals on the same cases: sysidentpy's FROLS and pysindy's ensemble, over one library of columns.
+"""Rivals on the same cases: sysidentpy's FROLS and pysindy's ensemble, over one table of columns.
 
 Run as ``python -m rtcomp.trial.rival RIVAL CASE_FOLDER OUT.json``; writes what the rival names in the form
 of ``diagnosis.json``.
@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rtcomp.trial.library import Library, library
+from rtcomp.trial.columns import Columns, columns_of
 from rtcomp.trial.says import MOVED
 
 RIVALS = {"frols": "sysidentpy", "sindy": "pysindy"}
@@ -30,7 +30,7 @@ def missing(rival: str) -> bool:
     return importlib.util.find_spec(RIVALS[rival]) is None
 
 
-def frols(table: Library) -> list[str]:
+def frols(table: Columns) -> list[str]:
     """Return the effects that FROLS chooses (BIC), by the error that they take away.
 
     Billings (2013), Nonlinear System Identification, forward regression by orthogonal least squares; a
@@ -56,7 +56,7 @@ def frols(table: Library) -> list[str]:
     return found
 
 
-def sindy(table: Library) -> list[str]:
+def sindy(table: Columns) -> list[str]:
     """Return the effects that most of an ensemble of sparse regressions holds, by size.
 
     Fasel, Kutz, Brunton, Brunton (2022), Proc. R. Soc. A 478: STLSQ on resampled rows.
@@ -76,7 +76,7 @@ def sindy(table: Library) -> list[str]:
 
 def name(rival: str, folder: Path) -> dict[str, object]:
     """Return what a rival says of a case, in the form of ``diagnosis.json``."""
-    table = library(folder)
+    table = columns_of(folder)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         named = list(dict.fromkeys({"frols": frols, "sindy": sindy}[rival](table)))

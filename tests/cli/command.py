@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+from on_terminal import on_terminal
 
 RTCOMP = str(Path(sys.executable).parent / "rtcomp")
 
@@ -138,25 +139,5 @@ def write(path: Path, columns: dict[str, np.ndarray]) -> Path:
 
 def in_a_terminal(*arguments: object, at: Path) -> str:
     """Run `rtcomp` in the folder `at` on a terminal 100 columns wide; return all that it showed."""
-    import fcntl
-    import pty
-    import struct
-    import termios
-
-    pid, terminal = pty.fork()
-    if pid == 0:
-        os.chdir(at)
-        os.execve(RTCOMP, [RTCOMP, *map(str, arguments)], {**environment(), "TERM": "xterm"})
-    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 100, 0, 0))
-    shown = b""
-    while True:
-        try:
-            more = os.read(terminal, 65536)
-        except OSError:  # the other side is closed
-            break
-        if not more:
-            break
-        shown += more
-    _, status = os.waitpid(pid, 0)
-    assert os.waitstatus_to_exitcode(status) == 0, shown.decode()
-    return shown.decode()
+    command = [RTCOMP, *map(str, arguments)]
+    return on_terminal(command, at=at, environment={**environment(), "TERM": "xterm"}, columns=100).text

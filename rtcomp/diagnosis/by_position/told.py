@@ -7,14 +7,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rtcomp.diagnosis.base import Fitted
-from rtcomp.diagnosis.by_position import Judge, Verdicts, decide, scale_of
+from rtcomp.diagnosis.by_position.decide import Judge, Verdicts, decide, scale_of
+from rtcomp.diagnosis.by_position.sticking import count_of, hidden
+from rtcomp.diagnosis.by_position.turning import Knob, Setting, fit, robust
+from rtcomp.diagnosis.by_position.windows import Windows, windows_of
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.result import Candidate, Diagnosis, Fit, Named, PositionFit, Retuned, Value, Verdict
 from rtcomp.diagnosis.scene import Scene
-from rtcomp.diagnosis.shooting import Windows, windows_of
-from rtcomp.diagnosis.sticking import count_of, hidden
-from rtcomp.diagnosis.turning import Knob, Setting, fit, robust
 from rtcomp.kernels import Floats
 from rtcomp.physics import catalogue
 from rtcomp.recording.reader import Recording

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from rtcomp.diagnosis.by_position.windows import Windows
 from rtcomp.diagnosis.extend import _shift_bias
 from rtcomp.diagnosis.ledger import BIASES
 from rtcomp.diagnosis.scene import Entry
-from rtcomp.diagnosis.shooting import Windows
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Parameter, catalogue

@@ -16,7 +16,7 @@ ROWS = 4000
 
 
 @dataclass(frozen=True)
-class Library:
+class Columns:
     """What a rival is given, with everything that retuning takes up already taken out.
 
     The force to explain (N, (K,)), candidate columns (K, C), the effect that each stands for; and the
@@ -29,8 +29,8 @@ class Library:
     retuned: tuple[tuple[str, float, float], ...]
 
 
-def library(folder: Path) -> Library:
-    """Return the library of the recording and stage in a case's folder."""
+def columns_of(folder: Path) -> Columns:
+    """Return the columns of the recording and stage in a case's folder."""
     from scipy.signal import butter, sosfiltfilt
 
     raw = np.loadtxt(folder / "train.csv.gz", delimiter=",", skiprows=1)
@@ -95,7 +95,7 @@ def library(folder: Path) -> Library:
     better = believed + np.linalg.lstsq(base[keep], mismatch[keep], rcond=1e-12)[0]
     keys = ("mass", "viscous", "friction.level", "micro_damping")
     moved = tuple((key, float(believed[i]), float(better[i])) for i, key in enumerate(keys))
-    return Library(left, columns, tuple(items[int(i)][0] for i in kept), moved)
+    return Columns(left, columns, tuple(items[int(i)][0] for i in kept), moved)
 
 
 @compiled

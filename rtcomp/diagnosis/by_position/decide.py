@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rtcomp.diagnosis.by_position.turning import ANCHORS, Setting, fit, robust
+from rtcomp.diagnosis.by_position.windows import Windows
 from rtcomp.diagnosis.candidates import searches
 from rtcomp.diagnosis.motion import BLOCKS, UNSEEN
 from rtcomp.diagnosis.scene import Column, Entry, Scene
-from rtcomp.diagnosis.shooting import Windows
-from rtcomp.diagnosis.turning import ANCHORS, Setting, fit, robust
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Place, catalogue
