@@ -15,6 +15,7 @@ from rtcomp.diagnosis.refine import Refined, refine
 from rtcomp.diagnosis.scene import Entry, Scene
 from rtcomp.diagnosis.screen import Screened, screen
 from rtcomp.errors import ConfigError
+from rtcomp.physics.coupled import CONTACT, LOAD_SHARE
 from rtcomp.stage.stage import Stage
 
 SHORTLIST = 7
@@ -91,6 +92,8 @@ def _variants(entry: Entry, stage: Stage) -> list[Entry]:
         return [entry, {**entry, "stiffening": 1.0}]
     if name == "stiction-ageing":
         return [{**entry, "onset": onset} for onset in (0.1, 0.01)]
+    if name == "backlash" and "contact" not in entry:
+        return [entry, {**entry, "share": LOAD_SHARE, "contact": CONTACT}]
     if name == "drive-offset":
         # The same force, but beside what changes the drive it is not the same physics.
         force = float(entry["offset"]) * stage.force_constant  # type: ignore[arg-type]

@@ -18,10 +18,9 @@ import numpy as np
 from rtcomp.diagnosis.bank import units_along
 from rtcomp.diagnosis.blocks import Blocks
 from rtcomp.diagnosis.motion import BLOCKS, UNSEEN, Motion, Strip
-from rtcomp.diagnosis.path import behind_play, derivatives, kinematics
+from rtcomp.diagnosis.path import Load, behind_play, derivatives, kinematics
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place
-from rtcomp.physics.coupled import LOAD_SHARE
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.stage.balance import around_rows, forces
 from rtcomp.stage.stage import Stage
@@ -119,7 +118,7 @@ class Ledger:
         modifiers = [e for e in effects if e.place is Place.FRICTION]
         sensors = [e for e in effects if e.place is Place.SENSOR]
         others = [e for e in effects if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
-        gap = sum(float(e.values["gap"]) for e in effects if e.name == "backlash")
+        play = next((e for e in others if e.name == "backlash" and e.values["gap"] > 0.0), None)
         others = [e for e in others if e.name != "backlash"]
         before: list[Effect] = []
         if any(e.name == "load-dependent-friction" for e in modifiers):
@@ -133,11 +132,11 @@ class Ledger:
             given = self._given(strip, drive, x, v, a)
             sides.append(given + around_rows(f.push - f.friction))
             moved = a * f.mass / self.stage.mass
-            if gap > 0.0:
-                rest = derivatives(self._behind(x, gap), self.motion.period)[1]
-                moved = moved + LOAD_SHARE * (rest - a)
+            if play is not None:
+                rest = derivatives(self._behind(x, play), self.motion.period)[1]
+                moved = moved + play.values["share"] * (rest - a)
             masses.append(moved)
-        columns = [self.motion.smooth(masses), self._friction(before, modifiers, sensors, gap)]
+        columns = [self.motion.smooth(masses), self._friction(before, modifiers, sensors, play)]
         names = (MASS, VISCOUS, MICRO, *(f"reach {r:.3g}" for r in self.reaches))
         y = self.motion.smooth(sides)
         if self.biased:
@@ -155,24 +154,33 @@ class Ledger:
             self._paths = key, found
         return self._paths[1]
 
-    def _behind(self, x: Floats, gap: float) -> Floats:
+    def _behind(self, x: Floats, play: Effect) -> Floats:
         # As believed: a play that is not yet in the balance is taken for longer reaches.
-        friction = self.stage.friction
+        m, friction = self.stage.mechanics, self.stage.friction
+        weights, reaches = self.weights, self.reaches
         if isinstance(friction, MaxwellSlip):
-            return behind_play(x, gap, *map(np.array, zip(*friction.elements, strict=True)))
-        return behind_play(x, gap, self.weights, self.reaches)
+            weights, reaches = (np.array(c) for c in zip(*friction.elements, strict=True))
+        load = Load(
+            play.values["share"] * m.mass, m.viscous, m.micro_damping, m.micro_damping_speed, weights, reaches
+        )
+        return behind_play(x, self.motion.period, play.values["gap"], play.values["contact"], load)
 
     def _friction(
-        self, before: Sequence[Effect], modifiers: Sequence[Effect], sensors: Sequence[Effect], gap: float
+        self,
+        before: Sequence[Effect],
+        modifiers: Sequence[Effect],
+        sensors: Sequence[Effect],
+        play: Effect | None,
     ) -> Floats:
         """Return the units of friction on the kept rows; remembered by what changes them."""
-        weighs = gap > 0.0 or any(e.name in WHOLE for e in modifiers)
-        key = (_key(before), _key(modifiers), _key(sensors), gap, weighs and self.weights.tobytes())
+        weighs = play is not None or any(e.name in WHOLE for e in modifiers)
+        plays = _key([] if play is None else [play])
+        key = (_key(before), _key(modifiers), _key(sensors), plays, weighs and self.weights.tobytes())
         if key not in self._frictions:
             rows = []
             for strip, (x, v, a) in zip(self.motion.strips, self._kinematics(sensors), strict=True):
-                if gap > 0.0:
-                    x = self._behind(x, gap)
+                if play is not None:
+                    x = self._behind(x, play)
                     v, a = derivatives(x, self.motion.period)
                 held = np.append(strip.voltage[:1], strip.voltage[:-1])
                 motion = np.column_stack([strip.time, x, v, a, held])

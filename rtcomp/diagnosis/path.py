@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from rtcomp.diagnosis.motion import Motion, Strip
 from rtcomp.kernels import Floats, call_effect, compiled
 from rtcomp.physics import Effect, Place
+from rtcomp.physics.coupled import contact
 from rtcomp.physics.rows import new_rows
 from rtcomp.physics.wires import SENSED, STEP, TIME
+
+FINE = 0.3
+"""Longest sub-step (rad) of the load's oscillation behind a play."""
 
 
 def kinematics(strip: Strip, motion: Motion, effects: Sequence[Effect] = ()) -> tuple[Floats, Floats, Floats]:
@@ -27,37 +33,57 @@ def derivatives(x: Floats, period: float) -> tuple[Floats, Floats]:
     return v, a
 
 
-@compiled
-def behind_play(x: Floats, gap: float, stiffness: Floats, reaches: Floats) -> Floats:
-    """Return the position (m) of a load with friction that `x` drives through a play of +-`gap` (m).
+@dataclass(frozen=True)
+class Load:
+    """What is behind a play: its friction and inertia, and how it meets the ends."""
 
-    Slow motion: in contact the load goes along as long as its friction, of these elements, holds it
-    against the end; where friction has relaxed it stays behind until the other end meets it.
+    mass: float
+    viscous: float
+    micro_damping: float
+    micro_speed: float
+    stiffness: Floats
+    """(n,) N/m of stop elements, with `reaches` (n,) m."""
+    reaches: Floats
+
+
+def behind_play(x: Floats, period: float, gap: float, contact_hz: float, load: Load) -> Floats:
+    """Return the position (m) of a load that `x` (m, rows of `period` s) drives through a play of +-`gap`.
+
+    The load's equation of motion, in sub-steps of its fastest oscillation: friction against the contact of
+    either end, which gives way and does not pull. Where neither end holds it, it stays, or flies on.
     """
+    omega = 2.0 * math.pi * contact_hz
+    held = math.sqrt(omega**2 + float(np.sum(load.stiffness)) / load.mass)
+    parts = max(1, math.ceil(period * held / FINE))
+    return _drawn(
+        x, period / parts, parts, gap, omega, load.mass, load.viscous, load.micro_damping, load.micro_speed,
+        load.stiffness, load.reaches,
+    )  # fmt: skip
+
+
+@compiled
+def _drawn(
+    x: Floats, h: float, parts: int, gap: float, omega: float, mass: float, viscous: float, micro: float,
+    micro_speed: float, stiffness: Floats, reaches: Floats,
+) -> Floats:  # fmt: skip
     out = np.empty_like(x)
     z = np.zeros_like(reaches)
-    y, side = x[0], 0.0
-    for k in range(x.size):
-        if side == 0.0:
-            if x[k] - y >= gap:
-                side = 1.0
-            elif x[k] - y <= -gap:
-                side = -1.0
-        if side != 0.0:
-            move = x[k] - side * gap - y
-            before = after = 0.0
+    y, u = x[0], 0.0
+    out[0] = y
+    for k in range(1, x.size):
+        base = (x[k] - x[k - 1]) / (h * parts)
+        for j in range(parts):
+            at = x[k - 1] + base * (j + 1) * h
+            friction = 0.0
             for i in range(z.size):
-                before += stiffness[i] * z[i]
-                after += stiffness[i] * min(max(z[i] + move, -reaches[i]), reaches[i])
-            part = 1.0
-            if after * side < 0.0:
-                part = before / (before - after) if before != after else 0.0
-                part = min(max(part, 0.0), 1.0)
+                friction += stiffness[i] * z[i]
+            ratio = u / micro_speed
+            damping = viscous + micro * math.exp(-ratio * ratio)
+            u += h * (contact(y - at, u - base, gap, omega) - friction / mass)
+            u /= 1.0 + h * damping / mass
             for i in range(z.size):
-                z[i] = min(max(z[i] + part * move, -reaches[i]), reaches[i])
-            y += part * move
-            if part < 1.0:
-                side = 0.0
+                z[i] = min(max(z[i] + h * u, -reaches[i]), reaches[i])
+            y += h * u
         out[k] = y
     return out
 

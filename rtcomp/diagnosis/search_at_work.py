@@ -58,8 +58,17 @@ def _presliding(s: Scene) -> list[Point]:
     points += [
         {"name": "creep", "fraction": f, "time_constant": t} for f in (0.05, 0.2) for t in (0.03, 0.3, 3.0)
     ]
-    points += [{"name": "backlash", "gap": g * reach} for g in (0.03, 0.1, 0.25, 0.6, 1.5)]
+    for g in (0.01, 0.025, 0.07, 0.2, 0.6, 1.5):
+        play: Entry = {"name": "backlash", "gap": g * reach}
+        points += [play, *({**play, "share": 0.45, "contact": hz} for hz in _contacts(s, 0.45))]
     return [Point(p) for p in points]
+
+
+def _contacts(s: Scene, share: float) -> list[float]:
+    """Return frequencies (Hz) of a load on contacts two and eight times as stiff as its friction."""
+    ledger = s.fitted.ledger
+    stiffness = float(ledger.weights.sum())
+    return [float(np.sqrt(n * stiffness / (share * ledger.stage.mass)) / (2 * np.pi)) for n in (2.0, 8.0)]
 
 
 def _inertial(s: Scene) -> list[Point]:

@@ -15,9 +15,9 @@ from rtcomp.physics.effect import Effect, Parameter, Place
 from rtcomp.physics.wires import BEHIND, FRICTION, MASS, MOVED, PUSH, STEP, VELOCITY
 
 LOAD_SHARE: Final = 0.6
-"""Share of the moving mass that is behind the play."""
-CONTACT: Final = 2.0 * math.pi * 300.0
-"""Angular frequency (rad/s) of the load on its contact."""
+"""Share of the moving mass that is behind the play, unless said otherwise."""
+CONTACT: Final = 300.0
+"""Frequency (Hz) of the load on its contact, unless said otherwise."""
 CONTACT_DAMPING: Final = 0.1
 """Damping ratio of the load on its contact: it bounces back with about three quarters of its speed."""
 FINEST: Final = 0.1
@@ -57,25 +57,26 @@ def resonance(p: Floats, s: Floats, w: Floats) -> None:
 
 
 @compiled
-def contact(q: float, r: float, gap: float) -> float:
+def contact(q: float, r: float, gap: float, omega: float) -> float:
     """Return the contact's acceleration of the load (m/s^2), towards the middle; it never pulls."""
     depth = abs(q) - gap
     if depth <= 0.0:
         return 0.0
     side = math.copysign(1.0, q)
-    return -side * max(CONTACT * CONTACT * depth + 2.0 * CONTACT_DAMPING * CONTACT * r * side, 0.0)
+    return -side * max(omega * omega * depth + 2.0 * CONTACT_DAMPING * omega * r * side, 0.0)
 
 
 @effect_kernel
 def backlash(p: Floats, s: Floats, w: Floats) -> None:
-    """p: gap (m); s: place of the load in the play (m) and its speed (m/s, from the ground).
+    """p: gap (m), share (1), contact (Hz); s: the load's place in the play (m), speed (m/s, from the ground).
 
     Friction is a kick at the start of the step; free flight up to the contact and the contact are exact. A
     contact that begins lasts to the end of the step. What runs after this sees the load's motion.
     """
     if p[0] <= 0.0:
         return
-    mass = LOAD_SHARE * w[MASS]
+    omega = 2.0 * math.pi * p[2]
+    mass = p[1] * w[MASS]
     w[MASS] -= mass
     h = w[STEP]
     before = s[0]
@@ -84,7 +85,7 @@ def backlash(p: Floats, s: Floats, w: Floats) -> None:
         q, r = s[0], s[1] - h * w[BEHIND] / mass - base
         left = h
         side = math.copysign(p[0], q)
-        if contact(q, r, p[0]) == 0.0:  # in flight, up to the end it flies to
+        if contact(q, r, p[0], omega) == 0.0:  # in flight, up to the end it flies to
             side = math.copysign(p[0], r)
             flight = (side - q) / r if r != 0.0 else h
             if flight < h:
@@ -92,14 +93,14 @@ def backlash(p: Floats, s: Floats, w: Floats) -> None:
             else:
                 q, left = q + r * h, 0.0
         if left > 0.0:
-            q, r = swing(q - side, r, CONTACT, CONTACT_DAMPING, left)
+            q, r = swing(q - side, r, omega, CONTACT_DAMPING, left)
             q += side
         s[0], s[1] = q, r + base
         w[MOVED] += q - before
     else:
         s[0] -= w[MOVED]
         w[MOVED] = 0.0
-    w[PUSH] -= mass * contact(s[0], s[1] - w[VELOCITY], p[0])
+    w[PUSH] -= mass * contact(s[0], s[1] - w[VELOCITY], p[0], omega)
     w[VELOCITY] = s[1]
 
 
@@ -148,15 +149,18 @@ class Resonance(Effect):
 class Backlash(Effect):
     """Play of +-gap between the driven, measured mass and a load.
 
-    Only the gap is a parameter. What else a play needs is fixed: 60 % of the moving mass (LOAD_SHARE) and all
-    friction are behind it, the sensor, springs and other forces before it, and the load meets either end as a
-    mass on a spring of 300 Hz (CONTACT) with damping ratio 0.1 that does not pull. It starts in the middle,
-    at rest. `LoadFriction` closes it at the end of the chain.
+    `share` of the moving mass and all friction are behind it, the sensor, springs and other forces before it;
+    the load meets either end as a mass on a spring, of the frequency `contact` and damping ratio 0.1, that
+    does not pull. It starts in the middle, at rest. `LoadFriction` closes it at the end of the chain.
     """
 
     name = "backlash"
     place = Place.MECHANICS
-    parameters = (Parameter("gap", "m", 0.0, 1.0, "half of the play; 0 is none"),)
+    parameters = (
+        Parameter("gap", "m", 0.0, 1.0, "half of the play; 0 is none"),
+        Parameter("share", "1", 0.0, 0.95, "part of the moving mass behind it", LOAD_SHARE, open_low=True),
+        Parameter("contact", "Hz", 1.0, 1e4, "of the load on the spring of its contact", CONTACT),
+    )
     kernel = backlash
     says = "play between drive and load: after a reversal the load stays behind, until it is met with a knock"
     equation = "m_2 (x + q)'' = -k (|q| - gap)^+ sgn(q) - c q' in contact - friction"
@@ -170,11 +174,12 @@ class Backlash(Effect):
 
     def frequency(self) -> float:
         """Return that of load and stage on the contact (rad/s); 0 without a gap."""
-        return CONTACT / math.sqrt(1.0 - LOAD_SHARE) if self.values["gap"] > 0.0 else 0.0
+        omega = 2.0 * math.pi * self.values["contact"]
+        return omega / math.sqrt(1.0 - self.values["share"]) if self.values["gap"] > 0.0 else 0.0
 
     def longest_step(self) -> float:
         """Return a tenth of a radian of the contact (s)."""
-        return FINEST / CONTACT if self.values["gap"] > 0.0 else math.inf
+        return FINEST / (2.0 * math.pi * self.values["contact"]) if self.values["gap"] > 0.0 else math.inf
 
     def companions(self) -> list[Effect]:
         """Return what takes the friction from the mass and gives it to the load."""

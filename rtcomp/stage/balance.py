@@ -50,6 +50,15 @@ class Forces:
     push: Floats
     friction: Floats
     mass: Floats
+    rising: Floats
+    falling: Floats
+    """Push less friction over the row before each, weighed by what has passed of it, by what is to come."""
+
+    def others(self) -> Floats:
+        """Return push less friction, (K,) N, as second differences see it: its mean around each row."""
+        if np.any(self.rising):
+            return self.rising + np.append(self.falling[1:], self.falling[-1:])
+        return around_rows(self.push - self.friction)
 
 
 @dataclass(frozen=True)
@@ -85,14 +94,14 @@ def forces(
     an effect needs it; the drive's force is the mean over them, the others are those at the row.
     """
     program = Program([e for e in chain if e.place is not Place.SENSOR])
-    out = np.empty((4, time.size))
+    out = np.zeros((6, time.size))
     row = float((time[-1] - time[0]) / max(time.size - 1, 1))
-    parts = max(math.ceil(row / min((e.longest_step() for e in chain), default=math.inf) - 1e-9), parts)
+    needed = math.ceil(row / min((e.longest_step() for e in chain), default=math.inf) - 1e-9)
     motion = np.ascontiguousarray(np.column_stack([time, position, velocity, acceleration, volts]))
     base = np.array([stage.mass, stage.force_constant])
     w = np.zeros(wires.COUNT)
     w[GRAIN] = grain
-    _along(program.steps, program.p, program.s, w, base, motion, parts, out)
+    _along(program.steps, program.p, program.s, w, base, motion, max(needed, parts), needed > 1, out)
     return Forces(*out)
 
 
@@ -115,9 +124,13 @@ def along_row(w: Floats, motion: Floats, k: int, j: int, parts: int) -> None:
 
 @compiled
 def _along(
-    steps: np.ndarray, p: Floats, s: Floats, w: Floats, base: Floats, motion: Floats, parts: int, out: Floats
-) -> None:
-    """Fill `out`: the mean of the drive's force over the row's parts, the rest as it is at the row's end."""
+    steps: np.ndarray, p: Floats, s: Floats, w: Floats, base: Floats, motion: Floats, parts: int, fast: bool,
+    out: Floats,
+) -> None:  # fmt: skip
+    """Fill `out`: the mean of the drive's force over the row's parts, the rest as it is at the row's end.
+
+    Where effects are so `fast` that they change within a row, also the weighed means of the others' force.
+    """
     for k in range(motion.shape[0]):
         drive = 0.0
         for j in range(1, parts + 1):
@@ -125,6 +138,10 @@ def _along(
             renew(w, base[0], base[1])
             run_chain(steps, p, s, w, 0, steps[0])
             drive += w[DRIVE] / parts
+            if fast:
+                share = (w[PUSH] - w[FRICTION]) / parts
+                out[4, k] += share * (j - 0.5) / parts
+                out[5, k] += share * (1.0 - (j - 0.5) / parts)
         out[0, k], out[1, k], out[2, k], out[3, k] = drive, w[PUSH], w[FRICTION], w[MASS]
 
 
@@ -171,7 +188,7 @@ def force_balance(
     drive = [e for e in stage.chain if e.place is Place.DRIVE]
     held = np.append(voltage[:1], voltage[:-1])
     motion = forces(stage, stage.chain, time, position, velocity, acceleration, held, grain)
-    needed = motion.mass * acceleration + around_rows(motion.friction - motion.push)
+    needed = motion.mass * acceleration - motion.others()
     varying = any(e.name not in _STEADY for e in drive)
     over = forces(
         stage, drive, time, position, velocity, acceleration, held, parts=_PARTS if varying else 1

@@ -60,7 +60,7 @@ VOCABULARY = {
         "parallel-spring": "stiffness (N/m), cubic (N/m^3)",
         "gravity": "force (N), amplitude (N m), phase (rad)",
         "end-stop": "position (m), stiffness (N/m)",
-        "backlash": "gap (m)",
+        "backlash": "gap (m), share (1), contact (Hz)",
         "resonance": "frequency (Hz), damping (1), mass_ratio (1)",
     },
     "friction": {

@@ -82,7 +82,7 @@ def test_lost_motion_is_twice_the_gap():
     back = out[20_000:]
     smooth = np.convolve(resisting[20_000:], np.ones(100) / 100, "same")
     travel = 1e-3 - back[np.argmax(smooth < -1.0), POSITION]
-    loaded = 2.0 / (LOAD_SHARE * 2.0 * CONTACT**2)  # the contact's own deflection
+    loaded = 2.0 / (LOAD_SHARE * 2.0 * (2 * np.pi * CONTACT) ** 2)  # the contact's own deflection
     assert travel == pytest.approx(2 * gap + 2 * loaded + 5e-6, abs=4e-6)
     in_the_play = (x[20_000:] < 1e-3 - 1.5e-5) & (x[20_000:] > 1e-3 - 9e-5)
     assert np.abs(smooth[in_the_play]).mean() < 0.1
