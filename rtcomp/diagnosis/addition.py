@@ -91,7 +91,7 @@ def _variants(entry: Entry, stage: Stage) -> list[Entry]:
     if name in ("position-dependent-friction", "load-dependent-friction"):
         return [entry, {**entry, "stiffening": 1.0}]
     if name == "stiction-ageing":
-        return [{**entry, "onset": onset} for onset in (0.1, 0.01)]
+        return [{**entry, "onset": t, "stiffening": s} for t in (0.1, 0.01) for s in (0.0, 1.0)]
     if name == "backlash" and "contact" not in entry:
         return [entry, {**entry, "share": LOAD_SHARE, "contact": CONTACT}]
     if name == "drive-offset":

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.place_dependent import STIFFENING, grow
+from rtcomp.physics.growing import STIFFENING, grow
 from rtcomp.physics.wires import DRIVE, GRIP_LEVEL, PUSH
 
 

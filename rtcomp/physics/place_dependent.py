@@ -4,25 +4,12 @@ from __future__ import annotations
 
 import math
 
-from rtcomp.kernels import Floats, compiled, effect_kernel
+from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.drive import PERIOD, PHASE
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.wires import POSITION, REACH, SCALE
-
-STIFFENING = Parameter(
-    "stiffening", "1", 0.0, 1.0, "1: contacts that hold more are stiffer, 0: they only hold more", 0.0
-)
-
-
-@compiled
-def grow(w: Floats, factor: float, stiffening: float) -> None:
-    """Multiply the level of friction by `factor`, its stiffness by factor^stiffening."""
-    if stiffening > 0.0:
-        shared = factor**stiffening
-        w[SCALE] *= shared
-        factor /= shared
-    w[REACH] *= factor
+from rtcomp.physics.growing import STIFFENING, grow
+from rtcomp.physics.wires import POSITION
 
 
 @effect_kernel

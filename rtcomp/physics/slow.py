@@ -8,7 +8,8 @@ from typing import Final
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.wires import GRAIN, GRIP, GRIP_STIFFNESS, MOVED, REACH, SCALE, STEP, TIME
+from rtcomp.physics.growing import STIFFENING, grow
+from rtcomp.physics.wires import GRAIN, GRIP, GRIP_STIFFNESS, MOVED, SCALE, STEP, TIME
 
 FRESH: Final = 0.1
 """Time at rest (s) from which on the logarithm of ageing grows, unless told."""
@@ -22,7 +23,7 @@ def friction_drift(p: Floats, s: Floats, w: Floats) -> None:
 
 @effect_kernel
 def stiction_ageing(p: Floats, s: Floats, w: Floats) -> None:
-    """p: growth (1), distance (m), onset (s); s: age of the contacts (s), place (m) within the grain.
+    """p: growth, distance (m), onset (s), stiffening; s: age (s) of the contacts, place (m) within the grain.
 
     Exact for a step at constant speed.
     """
@@ -31,7 +32,7 @@ def stiction_ageing(p: Floats, s: Floats, w: Floats) -> None:
     slid = abs(inside - s[1]) / p[1]
     renewed = -math.expm1(-slid)
     s[0] += w[STEP] * (renewed / slid if slid > 1e-12 else 1.0) - s[0] * renewed
-    w[REACH] *= 1.0 + p[0] * math.log1p(s[0] / p[2])
+    grow(w, 1.0 + p[0] * math.log1p(s[0] / p[2]), p[3])
 
 
 @effect_kernel
@@ -74,7 +75,8 @@ class StictionAgeing(Effect):
 
     The age of the contacts grows with time and is lost over the sliding `distance` (the ageing law of rate
     and state friction); the yield level grows by `growth` for each e-fold of 1 + age / onset. Sliding at
-    speed v keeps the age at distance / v, next to nothing but for the slowest motion.
+    speed v keeps the age at distance / v, next to nothing but for the slowest motion. With `stiffening` 0
+    what sticks holds more before it slides, with 1 the whole force grows, also at rest.
     """
 
     name = "stiction-ageing"
@@ -83,10 +85,11 @@ class StictionAgeing(Effect):
         Parameter("growth", "1", 0.0, 10.0, "relative rise for each e-fold of time at rest"),
         Parameter("distance", "m", 0.0, 1e3, "sliding over which it fades to 1/e", open_low=True),
         Parameter("onset", "s", 0.0, 1e3, "time at rest from which on it grows", FRESH, open_low=True),
+        STIFFENING,
     )
     kernel = stiction_ageing
     says = "friction at break-away grows with the logarithm of the time at rest, and fades as sliding begins"
-    equation = "dage/dt = 1 - |v| age / distance,  yield <- yield (1 + growth ln(1 + age / 0.1 s))"
+    equation = "dage/dt = 1 - |v| age / distance,  yield <- yield (1 + growth ln(1 + age / onset))"
     source = "Dieterich (1979), J. Geophysical Research 84(B5); Ruina (1983), J. Geophysical Research 88(B12)"
     signature = "residual peaks at break-away that are higher the longer the rest before"
     experiment = "starts from rest after waiting times spaced logarithmically"

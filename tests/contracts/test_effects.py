@@ -73,7 +73,7 @@ VOCABULARY = {
         "load-dependent-friction": "coefficient (1), external (1), stiffening (1)",
         "non-congruent-friction": "softening (1)",
         "frictional-lag": "time_constant (s)",
-        "stiction-ageing": "growth (1), distance (m), onset (s)",
+        "stiction-ageing": "growth (1), distance (m), onset (s), stiffening (1)",
         "friction-drift": "change (1), time_constant (s)",
         "creep": "fraction (1), time_constant (s)",
     },
