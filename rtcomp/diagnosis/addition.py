@@ -90,8 +90,12 @@ def _variants(entry: Entry, stage: Stage) -> list[Entry]:
     name = str(entry["name"])
     if name in ("position-dependent-friction", "load-dependent-friction"):
         return [entry, {**entry, "stiffening": 1.0}]
+    if name == "frictional-lag" and "stiffening" not in entry:
+        return [entry, {**entry, "stiffening": 1.0}]
+    if name == "stribeck":
+        return [entry, {**entry, "stiffening": 0.5}]
     if name == "stiction-ageing":
-        return [{**entry, "onset": t, "stiffening": s} for t in (0.1, 0.01) for s in (0.0, 1.0)]
+        return [{**entry, "onset": t, "stiffening": s} for t in (0.1, 0.01) for s in (0.0, 0.7)]
     if name == "backlash" and "contact" not in entry:
         return [entry, {**entry, "share": LOAD_SHARE, "contact": CONTACT}]
     if name == "drive-offset":

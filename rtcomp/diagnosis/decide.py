@@ -33,14 +33,15 @@ ABOVE_FLOOR = 1.6
 """Squared error over the floor's, below which nothing is missing."""
 SETTLED = 0.004
 """Part of the first excess over the floor, below which what is left is how the kernels model, not physics."""
-BESIDE = 0.15
-"""Part of what the entries before it explain, from which on a further entry counts beside them."""
+BESIDE, MORE = 0.15, 0.3
+"""Part of what the entries before it explain, from which on a further entry counts beside them, and the part
+of what is left that it must explain then;"""
 REST = 0.5
-"""Part of what is left that a second or third entry must explain else,"""
+"""part of what is left that it must explain else,"""
 LEAST_BESIDE = 0.03
 """and part of what those before it explain,"""
-CLEARLY, DONE = 0.6, 1.3
-"""unless it explains this part of all that is there, down to so many times the floor."""
+ALL = 0.85
+"""unless it explains this part of all that is left: what is wrong with the first is not so well explained."""
 SURE = 8.0
 """Standard errors of what it gains, in nearly all blocks, from which on it counts beside others as well."""
 EXCHANGED = 0.93
@@ -154,14 +155,16 @@ def _worth_it(before: Floats, after: Floats, floor: Floats) -> bool:
 def _settles_the_rest(first: Floats, before: Floats, after: Floats, floor: Floats) -> bool:
     """Tell whether a further entry has a weight of its own, not one that trims how the first is modelled."""
     gained = float(before.sum() - after.sum())
-    left = float(max(before.sum() - floor.sum(), 0.0))
+    of_rest = gained / float(max(before.sum() - floor.sum(), 1e-300))
     beside = gained / max(float(first.sum() - before.sum()), 1e-300)
-    done = gained > CLEARLY * float(before.sum()) and float(after.sum()) < DONE * float(floor.sum())
     each = before - after
     steady = float(each.mean()) > SURE * float(each.std(ddof=1) / np.sqrt(each.size))
     everywhere = steady and bool(np.mean(each > 0.05 * before) >= 0.9)
-    rest = gained > REST * left and (beside > LEAST_BESIDE or done)
-    return beside > BESIDE or rest or (beside > LEAST_BESIDE and everywhere)
+    return (
+        of_rest > ALL
+        or (beside > BESIDE and of_rest > MORE)
+        or (beside > LEAST_BESIDE and (of_rest > REST or everywhere))
+    )
 
 
 def _exchange(

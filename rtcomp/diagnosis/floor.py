@@ -46,8 +46,8 @@ def stage_effects(stage: Stage, ledger: Ledger) -> list:  # type: ignore[type-ar
     """Return the effects of `stage` that the ledger does not already know."""
     from rtcomp.diagnosis.candidates import effect_of
 
-    known = [e.to_dict() for e in ledger.known]
-    return [effect_of(e) for e in stage.mechanics.effects if e not in known]
+    effects = [effect_of(e) for e in stage.mechanics.effects]
+    return [e for e in effects if e not in ledger.known]
 
 
 def _shaken(fitted: Fitted, motion: Motion, seed: int) -> np.ndarray:

@@ -19,8 +19,10 @@ from rtcomp.physics import Parameter, catalogue
 
 SCALING = ("drive-gain", "sensor-scale", "inertia")
 """Entries that do what other believed numbers would do together."""
-SEARCHED = ("time", "stiffening")
-"""Parameters that the search settles: a jump is between two rows, contacts stiffen or do not."""
+SEARCHED = ("time",)
+"""Parameters that the search settles: a jump is between two rows."""
+BETWEEN = (0.02, 0.98)
+"""Range of a stiffening that is refined."""
 BELIEF = 3e-4
 """Weight of a believed number's usual error, in squared errors of the whole recording."""
 HEAVY = 0.5
@@ -78,7 +80,9 @@ def knobs_of(entries: Sequence[Entry], motion: Motion, which: Sequence[int] | No
             step = 0.01 * size
             if parameter.name in SEARCHED:
                 continue
-            if parameter.name == "period":
+            if parameter.name == "stiffening":
+                step = 0.05 if 0.0 < float(value) < 1.0 else 0.0  # else the search has settled it
+            elif parameter.name == "period":
                 step = min(0.02 * size, 0.05 * size**2 / (high - low))
             elif parameter.name == "phase":
                 step = 0.05
@@ -106,7 +110,10 @@ def at(entries: Sequence[Entry], knobs: Sequence[Knob], moved: Floats) -> list[E
         if p.low >= 0.0 and p.name not in ("amplitude",):
             value = max(value, 0.2 * before)  # sizes and times do not change sign
         high = min(p.high, 1e300 if knob.most is None else knob.most)
-        out[knob.entry][p.name] = float(np.clip(value, max(p.low, -1e300), high))
+        low = max(p.low, -1e300)
+        if p.name == "stiffening":
+            low, high = BETWEEN  # its ends are the search's, not refined any more
+        out[knob.entry][p.name] = float(np.clip(value, low, high))
     return out
 
 

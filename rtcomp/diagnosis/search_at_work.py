@@ -41,7 +41,9 @@ def _speed_dependent(s: Scene) -> list[Point]:
     points: list[Entry] = [
         {"name": "stribeck", "rise": rise, "velocity": float(v)} for v in s.speeds(5) for rise in (0.15, 0.5)
     ]
-    points += [{"name": "frictional-lag", "time_constant": t} for t in (2e-3, 1e-2, 5e-2)]
+    for t in (2e-3, 1e-2, 5e-2, 0.2):
+        late: Entry = {"name": "frictional-lag", "time_constant": t}
+        points += [late, {**late, "stiffening": 1.0}]
     return [Point(p) for p in points]
 
 

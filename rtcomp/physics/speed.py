@@ -7,8 +7,9 @@ import math
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
+from rtcomp.physics.growing import STIFFENING, grow
 from rtcomp.physics.level import speed_midway, viscous_speed
-from rtcomp.physics.wires import FRICTION, LATE, REACH, SKEW, STEP, VELOCITY
+from rtcomp.physics.wires import FRICTION, LATE, SKEW, STEP, STIFFENS, VELOCITY
 
 
 @effect_kernel
@@ -26,9 +27,9 @@ def micro_damping(p: Floats, s: Floats, w: Floats) -> None:
 
 @effect_kernel
 def stribeck(p: Floats, s: Floats, w: Floats) -> None:
-    """p: rise (1), velocity (m/s)."""
+    """p: rise (1), velocity (m/s), stiffening (1)."""
     ratio = speed_midway(w) / p[1]
-    w[REACH] *= 1.0 + p[0] * math.exp(-ratio * ratio)
+    grow(w, 1.0 + p[0] * math.exp(-ratio * ratio), max(p[2], w[STIFFENS]))
 
 
 @effect_kernel
@@ -39,7 +40,7 @@ def asymmetric_viscous(p: Floats, s: Floats, w: Floats) -> None:
 
 @effect_kernel
 def frictional_lag(p: Floats, s: Floats, w: Floats) -> None:
-    """p: time constant (s); s: lagged velocity, velocity at the last call (m/s).
+    """p: time constant (s), stiffening (1); s: lagged velocity, velocity at the last call (m/s).
 
     Exact for a velocity that changes linearly over the step.
     """
@@ -51,6 +52,7 @@ def frictional_lag(p: Floats, s: Floats, w: Floats) -> None:
         s[0] = v + (s[0] - s[1]) * keep - (v - s[1]) * -math.expm1(-h / p[0]) * p[0] / h
     s[1] = v
     w[LATE] = v - s[0]
+    w[STIFFENS] = p[1]
 
 
 @effect_kernel
@@ -127,13 +129,17 @@ class MicroDamping(Effect):
 
 @register
 class Stribeck(Effect):
-    """Friction that falls with speed from its static level."""
+    """Friction that falls with speed from its static level.
+
+    With `stiffening` 0 what sticks keeps its force while the level changes, with 1 the whole force follows it.
+    """
 
     name = "stribeck"
     place = Place.FRICTION
     parameters = (
         Parameter("rise", "1", -0.9, 10.0, "static over sliding level, less one"),
         Parameter("velocity", "m/s", 0.0, 1e3, "speed at which the rise has fallen to 1/e", open_low=True),
+        STIFFENING,
     )
     kernel = stribeck
     says = "friction falls with speed from its static level: the yield level is higher near rest"
@@ -177,12 +183,16 @@ class FrictionalLag(Effect):
 
     Viscous and quadratic friction and every level that falls with speed (`stribeck`, and that of lugre, gms,
     leuven and modified-leuven, beside what lag these have of themselves) take the lagged speed; damping of
-    the contacts does not. `dahl` and stop elements alone have nothing that depends on speed.
+    the contacts does not. `dahl` and stop elements alone have nothing that depends on speed. With `stiffening`
+    1 the whole force of friction follows a level of `stribeck` that changes late, also while it sticks.
     """
 
     name = "frictional-lag"
     place = Place.FRICTION
-    parameters = (Parameter("time_constant", "s", 0.0, 1e2, "with which friction follows speed"),)
+    parameters = (
+        Parameter("time_constant", "s", 0.0, 1e2, "with which friction follows speed"),
+        STIFFENING,
+    )
     kernel = frictional_lag
     says = "the speed-dependent part of friction follows speed late, as the lubricant film builds up"
     equation = "T dv'/dt = v - v',  F = F(v')"
