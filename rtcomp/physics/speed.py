@@ -131,7 +131,7 @@ class MicroDamping(Effect):
 class Stribeck(Effect):
     """Friction that falls with speed from its static level.
 
-    With `stiffening` 0 what sticks keeps its force while the level changes, with 1 the whole force follows it.
+    With `stiffening` 0 what sticks keeps its force while the level changes, with 1 the whole force follows.
     """
 
     name = "stribeck"
@@ -183,8 +183,9 @@ class FrictionalLag(Effect):
 
     Viscous and quadratic friction and every level that falls with speed (`stribeck`, and that of lugre, gms,
     leuven and modified-leuven, beside what lag these have of themselves) take the lagged speed; damping of
-    the contacts does not. `dahl` and stop elements alone have nothing that depends on speed. With `stiffening`
-    1 the whole force of friction follows a level of `stribeck` that changes late, also while it sticks.
+    the contacts does not. `dahl` and stop elements alone have nothing that depends on speed. With
+    `stiffening` 1 the whole force of friction follows a level of `stribeck` that changes late, also while it
+    sticks.
     """
 
     name = "frictional-lag"

@@ -5,9 +5,9 @@ opposes motion. All SI.
 
 Who drives the chain resets before each step what effects add to (DRIVE, PUSH, FRICTION: 0), multiply (REACH,
 SCALE: 1) and take from the stage (MASS, GAIN). GRIP, GRIP_LEVEL, GRIP_STIFFNESS and BEHIND stay from step to
-step: written late in the chain, they are read before that at the next step (0 at first). LATE, SKEW
-and STIFFENS are written by their one effect at each step and are 0 without it. A stage has one friction model; of two, the
-later one's GRIP would be read.
+step: written late in the chain, they are read before that at the next step (0 at first). LATE, SKEW and
+STIFFENS are written by their one effect at each step and are 0 without it. A stage has one friction model; of
+two, the later one's GRIP would be read.
 """
 
 from __future__ import annotations
