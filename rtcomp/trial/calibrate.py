@@ -28,11 +28,13 @@ class Grown:
     changes: dict[str, float]
     parameters: dict[str, float]
     shows: Strength
+    beyond_belief: bool = True
+    """Whether the stage with it is further from the believed one than beliefs are wrong anyway."""
 
     @property
     def detectable(self) -> bool:
-        """Whether it stands out of what noise and sampling leave."""
-        return self.shows.detectability(SECRETS[self.name].retuning) >= NEEDED
+        """Whether it stands out of what noise and sampling leave, and of what beliefs are wrong by."""
+        return self.beyond_belief and self.shows.detectability(SECRETS[self.name].retuning) >= NEEDED
 
     def to_json(self) -> dict[str, Any]:
         """Return it as it is sealed."""
@@ -43,6 +45,7 @@ class Grown:
             "share": self.shows.share,
             "beyond": self.shows.beyond,
             "floor": self.shows.floor,
+            "beyond_belief": self.beyond_belief,
             "detectable": self.detectable,
         }
 
@@ -50,7 +53,7 @@ class Grown:
     def from_json(cls, data: dict[str, Any]) -> Grown:
         """Read what `to_json` wrote."""
         shows = Strength(data["share"], data["beyond"], data["floor"])
-        return cls(data["name"], data["changes"], data["parameters"], shows)
+        return cls(data["name"], data["changes"], data["parameters"], shows, data["beyond_belief"])
 
 
 def grow(secret: Secret, sized: Sized, rig: Rig, reference: Floats, clean: Run, target: float) -> Grown:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,13 @@ ALIKE = (
     {"backlash", "resonance"},
 )
 """Not hidden together: what one says of them, one cannot say of the other."""
+PER_VOLT = {
+    "drive-gain": ("mass", "viscous", "level"),
+    "inertia": ("mass",),
+    "viscous-friction": ("viscous",),
+    "back-emf": ("viscous",),
+}
+"""What an effect changes of the stage, per volt: a belief that is as wrong anyway hides it."""
 
 
 @dataclass(frozen=True)
@@ -169,6 +176,7 @@ def draw(plan: Plan) -> Case:
     full = physics
     for grown in hidden:
         full = full._replace(**grown.changes)
+    hidden = [replace(g, beyond_belief=believed.off(full, PER_VOLT.get(g.name, ()))) for g in hidden]
     stage = stage_file(believed, loop, known)
     return Case(plan, full, physics, loop, motion, stage, tuple(hidden))
 

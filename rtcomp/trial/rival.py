@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from rtcomp.trial.columns import Columns, columns_of
-from rtcomp.trial.says import MOVED
+from rtcomp.trial.stagefile import MOVED
 
 RIVALS = {"frols": "sysidentpy", "sindy": "pysindy"}
 """Rivals, and the package that each needs (extras group `rivals`)."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rtcomp.trial.calibrate import Grown
+from rtcomp.trial.stagefile import MOVED
 
 LATE = frozenset({"drive-delay", "drive-lag", "sensor-delay"})
 STEADY = frozenset({"drive-offset", "constant-force", "gravity"})
@@ -31,8 +32,6 @@ RETUNED: dict[str, frozenset[str]] = {
     "back-emf": frozenset({"viscous"}),
 }
 """Parameters of the stage whose retuning says the same as the effect's name."""
-MOVED = 0.11
-"""A retuning by more than a belief is ever wrong without anything hidden (a tenth)."""
 SLOTS = {"mass": "mass", "viscous": "viscous", "force_constant": "force_constant", "friction.level": "level"}
 """Retuned parameters by their names in the plant."""
 NEAR = 0.05

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from rtcomp.trial.plant import Loop, Physics, Run
 
 ELEMENTS = 18
 """Stop elements that stand for the plant's smooth friction; they miss it by 0.15 % of the level at most."""
+MOVED = 0.11
+"""A change by more than a belief is ever wrong without anything hidden (a tenth)."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,14 @@ class Believed:
             micro_damping=physics.micro_damping * off[2],
         )  # fmt: skip
         return cls(wrong, tuple(common + 0.03 * chance.uniform(-1.0, 1.0, ELEMENTS)))
+
+    def off(self, truth: Physics, quantities: Sequence[str]) -> bool:
+        """Tell whether one of `quantities` is, per volt, off by more than beliefs are; True without any."""
+        p, factor = self.physics, sum(self.stiffness) / ELEMENTS
+        believed = {"mass": p.mass, "viscous": p.viscous, "level": p.level * factor}
+        true = {"mass": truth.mass, "viscous": truth.viscous + truth.back_emf, "level": truth.level}
+        volts = p.force_constant / truth.force_constant
+        return not quantities or any(abs(volts * true[q] / believed[q] - 1.0) > MOVED for q in quantities)
 
 
 def stage_file(believed: Believed, loop: Loop, known: list[dict[str, Any]]) -> dict[str, Any]:
