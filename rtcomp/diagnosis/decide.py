@@ -7,12 +7,12 @@ names is all that explain it as well on this recording.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rtcomp.diagnosis.addition import Progress, best_addition, settle
-from rtcomp.diagnosis.alike import SHAPELESS, alike, last
+from rtcomp.diagnosis.addition import Addition, Progress, best_addition, settle
+from rtcomp.diagnosis.alike import ONE_THING, SHAPELESS, alike, last
 from rtcomp.diagnosis.base import Fitted
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Refined, refine
@@ -36,14 +36,20 @@ SETTLED = 0.004
 BESIDE, MORE = 0.15, 0.3
 """Part of what the entries before it explain, from which on a further entry counts beside them, and the part
 of what is left that it must explain then;"""
-REST = 0.5
+REST = 0.6
 """part of what is left that it must explain else,"""
-LEAST_BESIDE = 0.03
+LEAST_BESIDE = 0.05
 """and part of what those before it explain,"""
 ALL = 0.85
 """unless it explains this part of all that is left: what is wrong with the first is not so well explained."""
 SURE = 8.0
 """Standard errors of what it gains, in nearly all blocks, from which on it counts beside others as well."""
+RIVAL, TOGETHER, SHAPED = 0.7, 0.6, 0.95
+"""Part of the first entry's gain from which on another is tried in its place, and the part of the error with
+the first and its best second that must be left with the other and its own: in general, and for a shape in
+the place of none."""
+RIVALS = 2
+"""Others tried so at the most."""
 EXCHANGED = 0.93
 """Part of the error with one entry that must be left with another in its place, to take that one."""
 ENOUGH, POOR = 0.7, 0.5
@@ -106,16 +112,22 @@ def decide(
 
     refined = refine(base, motion, [])
     decision = Decision(refined, choices, base)
+    ahead: Addition | None = None
+    greedy: Refined | None = None
     for step in range(MOST):
         if current.errors.sum() < ABOVE_FLOOR * floor.sum():
             break
         if entries and current.errors.sum() - floor.sum() < SETTLED * (base.errors.sum() - floor.sum()):
             break
-        added = best_addition(stage, motion, current, entries, part_of(step), without)
-        best = added.best
+        added = ahead or best_addition(stage, motion, current, entries, part_of(step), without)
+        ahead = None
         if step == 0:
             decision.first_look, decision.first_refined = added.looked, added.gains
-        if best is None or not _worth_it(current.errors, best.errors, floor):
+            greedy = added.best
+            added, ahead = _look_ahead(stage, motion, current, added, floor, part_of(step), without)
+        best = added.best
+        together = step == 0 and best is not greedy
+        if best is None or not (together or _worth_it(current.errors, best.errors, floor)):
             break
         if entries and not _settles_the_rest(base.errors, current.errors, best.errors, floor):
             break
@@ -127,6 +139,9 @@ def decide(
     if len(choices) > 1:
         refined = _exchange(stage, motion, refined, choices, floor, part_of(MOST - 1), without)
     refined, choices = _prune(stage, motion, base, refined, choices, floor)
+    first = {c.names[0] for c in choices}
+    for choice in choices:
+        choice.names[1:] = [n for n in choice.names[1:] if n not in first]
     decision.refined, decision.choices = refined, choices
     return decision
 
@@ -165,6 +180,49 @@ def _settles_the_rest(first: Floats, before: Floats, after: Floats, floor: Float
         or (beside > BESIDE and of_rest > MORE)
         or (beside > LEAST_BESIDE and (of_rest > REST or everywhere))
     )
+
+
+def _look_ahead(
+    stage: Stage,
+    motion: Motion,
+    base: Fitted,
+    first: Addition,
+    floor: Floats,
+    progress: Progress,
+    without: frozenset[str],
+) -> tuple[Addition, Addition | None]:
+    """Return the first entry that does best with a second beside it, and that second where it was looked for.
+
+    Where two effects hide in each other the first one found had to do for both, and may be neither.
+    """
+    best = first.best
+    if best is None or best.errors.sum() < ABOVE_FLOOR * floor.sum():
+        return first, None
+    gain = float(base.errors.sum() - best.errors.sum())
+    group = next((set(g) for g in ONE_THING if last(best) in g), {last(best)})
+    rivals = [
+        r
+        for r in first.others
+        if last(r) not in group
+        and last(r) not in SHAPELESS
+        and float(base.errors.sum() - r.errors.sum()) > RIVAL * gain
+    ]
+    if not rivals or not _worth_it(base.errors, best.errors, floor):
+        return first, None
+    own = best_addition(stage, motion, best.fitted, best.entries, progress, without)
+    chosen, ahead = best, own
+    left = float((own.best or best).errors.sum())
+    for rival in rivals[:RIVALS]:
+        other = best_addition(stage, motion, rival.fitted, rival.entries, progress, without)
+        both = other.best
+        if both is None or not _worth_it(base.errors, both.errors, floor):
+            continue
+        if not _settles_the_rest(base.errors, rival.errors, both.errors, floor):
+            continue
+        if float(both.errors.sum()) < (SHAPED if last(chosen) in SHAPELESS else TOGETHER) * left:
+            chosen, ahead, left = rival, other, float(both.errors.sum())
+    others = [best, *(r for r in first.others if r is not chosen)] if chosen is not best else first.others
+    return replace(first, best=chosen, others=others), ahead
 
 
 def _exchange(

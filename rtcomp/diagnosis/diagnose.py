@@ -19,7 +19,7 @@ from rtcomp.diagnosis.explain import explain
 from rtcomp.diagnosis.extend import extended_stage
 from rtcomp.diagnosis.floor import floor_errors
 from rtcomp.diagnosis.locate import locate
-from rtcomp.diagnosis.motion import UNSEEN, Motion, prepare
+from rtcomp.diagnosis.motion import Motion, prepare
 from rtcomp.diagnosis.refine import Refined, refine
 from rtcomp.diagnosis.result import (
     Candidate,
@@ -133,7 +133,7 @@ def diagnose(
         motion.plain([s.time for s in motion.strips]),
         base.residual,
         final.residual,
-        np.isin(base.ledger.block, UNSEEN).astype(np.float64),
+        np.isin(base.ledger.block, motion.unseen).astype(np.float64),
     )
 
 

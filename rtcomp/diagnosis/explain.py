@@ -13,7 +13,7 @@ from rtcomp.diagnosis.decide import Choice, Decision, decide
 from rtcomp.diagnosis.departure import departure
 from rtcomp.diagnosis.extend import extended_stage
 from rtcomp.diagnosis.locate import locate
-from rtcomp.diagnosis.motion import UNSEEN, Motion
+from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.result import Fit
 from rtcomp.diagnosis.scene import Entry
 from rtcomp.kernels import Floats
@@ -25,6 +25,8 @@ STRUCTURED = 0.3
 HARM, WORSE, HELP = 1.02, 1.1, 0.95
 """Factors on the held-out error of the stage, believed, retuned and (where it is more than the floor) retuned
 again, beyond which names are taken back."""
+LEAST = 0.35
+"""Part of the held-out squared error above the floor that a name with a shape of its own must explain."""
 STRAYED = 9.0
 """How much further (see `departure`) than half again the retuning names may take what is believed."""
 AGAIN = 2
@@ -75,7 +77,7 @@ def explain(
         fit = Fit(before, plain, _held_out(own, motion), rest)
         shaped = any(str(e["name"]) not in SHAPELESS for e in entries)
         strays = shaped and departure(final) > 1.5 * departure(base) + STRAYED
-        if not named or (_holds(fit) and not strays):
+        if not named or (_holds(fit) and not strays and not (shaped and _explains_little(fit))):
             return Explanation(decision, named, entries, own, final, fit)
         without |= {first}
     # What the ledger gains must hold in the stage itself; else it is not offered as an explanation.
@@ -91,24 +93,30 @@ def _holds(fit: Fit) -> bool:
     return fit.retuned < much or fit.after < HELP * fit.retuned
 
 
+def _explains_little(fit: Fit) -> bool:
+    """Tell whether names explain so little of what was put aside that they are the nearest, not the right."""
+    floor = (1.5 * fit.floor) ** 2
+    return fit.retuned**2 > floor and fit.after**2 - floor > (1.0 - LEAST) * (fit.retuned**2 - floor)
+
+
 def _held_out(stage: Stage, motion: Motion) -> float:
     """Return the relative force error of a whole stage on what nothing was fitted to or chosen by."""
     off = over = 0.0
-    block = motion.block()
+    block, aside = motion.block(), motion.unseen
     start = 0
     for strip in motion.strips:
         balance = force_balance(stage, strip.time, strip.position, strip.voltage, motion.cut)
         rows = motion.kept(strip)
         drive, needed = balance.force_drive[rows], balance.force_motion[rows]
-        unseen = np.isin(block[start : start + drive.size], UNSEEN)
+        unseen = np.isin(block[start : start + drive.size], aside)
         start += drive.size
         off += float(np.sum((drive - needed)[unseen] ** 2))
         over += float(np.sum(needed[unseen] ** 2))
     return float(np.sqrt(off / over)) if over > 0 else 0.0
 
 
-FOLDED = ("viscous-friction", "inertia")
-"""Entries that are numbers of the believed stage with other values: reported as retuned."""
+EVEN = 0.01
+"""Asymmetry of viscous friction below which there is none."""
 
 
 def _fold(
@@ -122,6 +130,9 @@ def _fold(
         if name == "viscous-friction" and stage.mechanics.viscous > 0:
             value = plain.mechanics.viscous + float(entry["coefficient"])  # type: ignore[arg-type]
             changes["viscous"] = max(value, 0.0)
+        elif name == "asymmetric-viscous-friction" and abs(float(entry["ratio"])) < EVEN:  # type: ignore[arg-type]
+            # Viscous friction is alike in both directions; only its size is another, which that released.
+            changes["viscous"] = plain.mechanics.viscous
         elif name == "inertia":
             # The base's mass is refitted beside the entry, whose kernel replaces the believed one.
             changes["mass"] = float(entry["mass"]) * plain.mass / stage.mass  # type: ignore[arg-type]

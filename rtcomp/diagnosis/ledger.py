@@ -17,12 +17,12 @@ import numpy as np
 
 from rtcomp.diagnosis.bank import units_along
 from rtcomp.diagnosis.blocks import Blocks
-from rtcomp.diagnosis.motion import BLOCKS, UNSEEN, Motion, Strip
+from rtcomp.diagnosis.motion import BLOCKS, Motion, Strip
 from rtcomp.diagnosis.path import Load, behind_play, derivatives, kinematics
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place
 from rtcomp.physics.maxwell_slip import MaxwellSlip
-from rtcomp.stage.balance import around_rows, forces
+from rtcomp.stage.balance import STEADY, around_rows, forces
 from rtcomp.stage.stage import Stage
 
 MASS, VISCOUS, MICRO, BIAS = "mass", "viscous", "micro_damping", "bias"
@@ -65,7 +65,7 @@ class Ledger:
         sensor = self.stage.sensor
         self.grain = 1.5 * sensor.noise + 0.5 * sensor.resolution
         self.seen = np.ones(BLOCKS, dtype=np.bool_)
-        self.seen[list(UNSEEN)] = False
+        self.seen[list(self.motion.unseen)] = False
         self.weights = believed_weights(self.stage, self.reaches)
         self._plain: System | None = None
         self._paths: tuple[object, list[tuple[Floats, Floats, Floats]]] = (None, [])
@@ -108,8 +108,10 @@ class Ledger:
         for strip in self.motion.strips:
             x, v, a = kinematics(strip, self.motion, sensors)
             held = np.append(strip.voltage[:1], strip.voltage[:-1])
-            f = forces(self.stage, [effect], strip.time, x, v, a, strip.voltage)
-            g = forces(self.stage, [effect], strip.time, x, v, a, held) if effect.place is Place.DRIVE else f
+            # Drag that depends on speed follows it as late as all friction does.
+            chain = [*(e for e in sensors if e.name == "frictional-lag"), effect]
+            f = forces(self.stage, chain, strip.time, x, v, a, strip.voltage)
+            g = forces(self.stage, chain, strip.time, x, v, a, held) if effect.place is Place.DRIVE else f
             rows.append(f.friction - f.push - 0.5 * (f.drive + g.drive))
         return self.motion.smooth(rows)
 
@@ -196,8 +198,8 @@ class Ledger:
     def _given(self, strip: Strip, drive: Sequence[Effect], x: Floats, v: Floats, a: Floats) -> Floats:
         chain = sorted([*self._drive(), *drive], key=lambda e: e.order)
         held = np.append(strip.voltage[:1], strip.voltage[:-1])
-        # What the drive remembers changes its force within a row; the mean over the row is what moved.
-        parts = PARTS if any(e.initial_state().size for e in chain) else 1
+        # What remembers, or depends on position, changes within a row; the mean over the row is what moved.
+        parts = PARTS if any(e.name not in STEADY for e in chain) else 1
         f = forces(self.stage, chain, strip.time, x, v, a, held, parts=parts)
         return 0.5 * (f.drive + np.append(f.drive[1:], f.drive[-1:])) + around_rows(f.push)
 

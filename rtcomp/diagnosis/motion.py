@@ -107,6 +107,20 @@ class Motion:
         count = sum(len(s.time[self.kept(s)]) for s in self.strips)
         return np.arange(count) * BLOCKS // count
 
+    @property
+    def unseen(self) -> tuple[int, ...]:
+        """Return the blocks that are put aside: UNSEEN, but none in which the sensor may have jumped.
+
+        What happens once can be learned only where it happens.
+        """
+        times, block = self.plain([s.time for s in self.strips]), self.block()
+        full = {int(block[np.argmin(np.abs(times - at))]) for at, _ in self.jumps}
+        chosen: list[int] = []
+        for k in UNSEEN:
+            free = [b for b in ((k + j) % BLOCKS for j in range(BLOCKS)) if b not in full and b not in chosen]
+            chosen += free[:1]
+        return tuple(chosen)
+
 
 def prepare(stage: Stage, recordings: Sequence[Recording], cut: float | None = None) -> Motion:
     """Bring recordings of one rate to a workable size: windows of long ones, averages of fast ones."""

@@ -36,7 +36,7 @@ from rtcomp.stage import lowpass
 from rtcomp.stage.inverse import undone
 from rtcomp.stage.stage import Stage
 
-_STEADY = {"drive-offset", "drive-deadband", "drive-saturation", "drive-gain", "drive-force"}
+STEADY = {"drive-offset", "drive-deadband", "drive-saturation", "drive-gain", "drive-force"}
 """Effects of the drive whose force does not change while the command is held."""
 _PARTS = 8
 """Parts of a row over which the force of another drive is averaged."""
@@ -189,7 +189,7 @@ def force_balance(
     held = np.append(voltage[:1], voltage[:-1])
     motion = forces(stage, stage.chain, time, position, velocity, acceleration, held, grain)
     needed = motion.mass * acceleration - motion.others()
-    varying = any(e.name not in _STEADY for e in drive)
+    varying = any(e.name not in STEADY for e in drive)
     over = forces(
         stage, drive, time, position, velocity, acceleration, held, parts=_PARTS if varying else 1
     ).drive

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from recorded import STAGE
 
 from rtcomp.diagnosis.bank import units_along
 from rtcomp.diagnosis.ledger import believed_weights
-from rtcomp.diagnosis.motion import WASHED, WINDOW_ROWS, WINDOWS, Strip, averaged, prepare
+from rtcomp.diagnosis.motion import UNSEEN, WASHED, WINDOW_ROWS, WINDOWS, Strip, averaged, prepare
 from rtcomp.kernels import Floats
 from rtcomp.physics import build
 from rtcomp.physics.effect import Place
@@ -123,3 +124,14 @@ def test_contacts_that_stiffen_multiply_the_whole_force() -> None:
     assert found[1.0] == pytest.approx(factor * plain, rel=1e-12)
     sliding = np.abs(plain) == np.abs(plain).max()
     assert found[0.0][~sliding] != pytest.approx((factor * plain)[~sliding], rel=1e-3)
+
+
+def test_a_jump_is_never_put_aside() -> None:
+    """It happens once: in a stretch that nothing may look at, it could not be found."""
+    time, x = wander()
+    motion = prepare(Stage.from_dict(STAGE), [recording(time, x)])
+    assert motion.unseen == UNSEEN
+    kept, block = motion.plain([s.time for s in motion.strips]), motion.block()
+    at = float(kept[block == UNSEEN[1]].mean())
+    jumped = replace(motion, jumps=((at, 1e-5),))
+    assert set(jumped.unseen) == {UNSEEN[0], UNSEEN[1] + 1, *UNSEEN[2:]}
