@@ -8,7 +8,7 @@ ARGS ?=
 export PYTHON
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test prove check bench picture clean
+.PHONY: help demo test prove check bench picture firmware clean
 
 help: ## list what can be made
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -31,8 +31,11 @@ bench: $(DEV) ## the benchmarks, one after the other
 picture: $(DEV) ## draw the pictures of README and pages anew
 	$(BIN)/python tools/make_pictures.py $(ARGS)
 
+firmware: ## the board's program in C, for this computer
+	@$(MAKE) --no-print-directory -C drivers/firmware
+
 clean: ## remove out/demo and what tools and compilers cached; .venv stays
-	rm -rf out/demo build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .benchmarks
+	rm -rf out/demo build dist drivers/firmware/build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .benchmarks
 	find rtcomp drivers tests tools -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # One at a time also under `make -j`: both install into the same environment.

@@ -20,18 +20,27 @@ from rtcomp.errors import DeviceError, DeviceTimeoutError
 class PlantProcess:
     """A running plant server; a context manager that ends it. It also ends by itself when this process dies.
 
-    Starting takes up to a minute the first time, when the simulation is compiled. Raises DeviceError where
-    the server ends instead of serving, with what it said, and DeviceTimeoutError where it says nothing.
+    With `firmware`, a program made by drivers/firmware, that is the board. Starting takes up to a minute the
+    first time, when the simulation is compiled. Raises DeviceError where the server ends instead of serving,
+    with what it said, and DeviceTimeoutError where it says nothing.
     """
 
     def __init__(
-        self, config: str | Path, *, seed: int = 0, realtime: bool = True, patience: float = 120.0
+        self,
+        config: str | Path,
+        *,
+        seed: int = 0,
+        realtime: bool = True,
+        patience: float = 120.0,
+        firmware: str | Path | None = None,
     ) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="rtcomp-plant-")
         self._log = Path(self._folder.name, "summary.json")
         self._errors = Path(self._folder.name, "errors.txt")
         command = [sys.executable, "-m", "rtcomp_drivers.plant_server", "--config", str(config), "--serial"]
         command += ["--until-eof", "--json", "--seed", str(seed), "--log", str(self._log)]
+        if firmware is not None:
+            command += ["--firmware", str(firmware)]
         if not realtime:
             command.append("--no-realtime")
         with self._errors.open("wb") as errors:

@@ -17,16 +17,16 @@ import select
 import signal
 import sys
 import time
-import tty
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from rtcomp.errors import ConfigError, DeviceError, RtcompError
-from rtcomp.stage.simulate import Simulator
+from rtcomp.errors import ConfigError, RtcompError
 from rtcomp.stage.stage import Stage
 from rtcomp_drivers.board import Board, BoardFacts
+from rtcomp_drivers.firmware_server import FirmwareServer, ready
+from rtcomp_drivers.pty_port import PtyPort
 
 _SLICE_S = 1e-3
 """s, longest wait for a frame before the plant is moved on."""
@@ -67,26 +67,15 @@ class PlantServer:
     """The board and its stage behind a pseudo-terminal. Build it, tell `port` to the host, `run` it."""
 
     def __init__(self, stage: Stage, seed: int = 0, text: str = "rtcomp plant server") -> None:
-        simulator = Simulator(stage, seed=seed)
-        simulator.advance(0.0, 1.0 / stage.rate)  # compiles, which takes seconds, before anybody waits
-        simulator.measure()
-        simulator.reset()
+        simulator = ready(stage, seed)
         facts = BoardFacts(axis=stage.axis, voltage_limit=stage.voltage_limit, text=text)
         self.board = Board(simulator, facts)
         self.keeping = Keeping()
         self.unsent = 0
         """Bytes that no host read."""
         self._stopped = False
-        try:
-            self._master, self._slave = os.openpty()
-        except OSError as error:
-            raise DeviceError(
-                f"no pseudo-terminal to be had ({error.strerror}); are too many open?"
-            ) from error
-        # Held open here too: with no host on it, the master would otherwise read end-of-file for ever.
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self.port = os.ttyname(self._slave)
+        self._port = PtyPort()
+        self.port = self._port.name
         """Path of the port for the host."""
         self.started = time.monotonic()
 
@@ -100,7 +89,7 @@ class PlantServer:
         `lifeline` is the descriptor of a pipe at whose end-of-file the server ends too: that comes when the
         process that holds its other end has ended, however it did.
         """
-        board, keeping, master = self.board, self.keeping, self._master
+        board, keeping, master = self.board, self.keeping, self._port.master
         watched = [master] if lifeline is None else [master, lifeline]
         clock, wait, read = time.monotonic, select.select, os.read
         self.started = clock() - board.time
@@ -126,12 +115,11 @@ class PlantServer:
                     self._say_too_slow()
         finally:
             board.shut_down(max(board.time, min(clock() - self.started, board.time + _SLICE_S)))
-            os.close(self._master)
-            os.close(self._slave)
+            self._port.close()
 
     def _send(self, answer: bytes) -> None:
         try:
-            sent = os.write(self._master, answer)
+            sent = os.write(self._port.master, answer)
         except BlockingIOError:
             sent = 0
         self.unsent += len(answer) - sent
@@ -192,8 +180,12 @@ def serve(
     log: Path | None = None,
     realtime: bool = True,
     until_eof: bool = False,
+    firmware: Path | None = None,
 ) -> dict[str, Any]:
     """Run `stage` behind a port until SIGINT or SIGTERM; return the summary that is also written.
+
+    With `firmware`, the program that drivers/firmware makes for this machine, the board is that program in a
+    process of its own, and this one is only what hangs on it.
 
     Prints one line with the port on stdout (`as_json`: an object), at exit a JSON summary on stderr, or to
     the file `log`. With `realtime` the process runs under SCHED_FIFO where that is allowed; what is in
@@ -203,7 +195,7 @@ def serve(
     """
     if link != "serial":
         raise ConfigError(f"plant server: unknown link {link!r}; it serves 'serial'")
-    server = PlantServer(stage, seed=seed)
+    server = PlantServer(stage, seed=seed) if firmware is None else FirmwareServer(stage, firmware, seed=seed)
 
     def end(_signal: int, _frame: FrameType | None) -> None:
         server.stop()
@@ -215,8 +207,9 @@ def serve(
     gc.disable()
     try:
         if as_json:
-            ready = {"port": server.port, "link": link, "pid": os.getpid(), "scheduling": _scheduling()}
-            line = json.dumps(ready)
+            line = json.dumps(
+                {"port": server.port, "link": link, "pid": os.getpid(), "scheduling": _scheduling()}
+            )
         else:
             line = f"port: {server.port}"
         print(line, flush=True)
@@ -274,6 +267,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--json", action="store_true", help="print the port as a JSON object")
     parser.add_argument("--log", type=Path, help="write the summary to this file instead of stderr")
     parser.add_argument("--seed", type=int, default=0, help="of the sensor's noise")
+    parser.add_argument("--firmware", type=Path, help="the board: a program made by drivers/firmware")
     parser.add_argument("--no-realtime", action="store_true", help="do not ask for SCHED_FIFO")
     parser.add_argument(
         "--until-eof", action="store_true", help="end at the end of standard input too: with who started it"
@@ -287,6 +281,7 @@ def main(arguments: list[str] | None = None) -> int:
             log=options.log,
             realtime=not options.no_realtime,
             until_eof=options.until_eof,
+            firmware=options.firmware,
         )
     except RtcompError as error:
         print(f"error: {error}", file=sys.stderr)

@@ -23,7 +23,10 @@ def plant() -> None:
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the simulated noise.")
 @click.option("--json", "as_json", is_flag=True, help="Print the port as JSON.")
 @click.option("--log", type=click.Path(path_type=Path), help="File for the summary at exit, else stderr.")
-def serve(config: Path, link: str, seed: int, as_json: bool, log: Path | None) -> None:
+@click.option(
+    "--firmware", type=click.Path(path_type=Path), help="The board's program, made by `make firmware`."
+)
+def serve(config: Path, link: str, seed: int, as_json: bool, log: Path | None, firmware: Path | None) -> None:
     """Serve the stage in CONFIG behind a pty and print the port to use; ends with Ctrl-C.
 
     It has the watchdog that a board has: without commands for the time set at arming, its output goes to
@@ -37,4 +40,4 @@ def serve(config: Path, link: str, seed: int, as_json: bool, log: Path | None) -
 
     from rtcomp.stage.stage import Stage
 
-    run(Stage.load(config), link=link, seed=seed, as_json=as_json, log=log)
+    run(Stage.load(config), link=link, seed=seed, as_json=as_json, log=log, firmware=firmware)
