@@ -44,10 +44,11 @@ ALL = 0.85
 """unless it explains this part of all that is left: what is wrong with the first is not so well explained."""
 SURE = 8.0
 """Standard errors of what it gains, in nearly all blocks, from which on it counts beside others as well."""
-RIVAL, TOGETHER, SHAPED = 0.7, 0.6, 0.95
-"""Part of the first entry's gain from which on another is tried in its place, and the part of the error with
-the first and its best second that must be left with the other and its own: in general, and for a shape in
-the place of none."""
+RIVAL, HALF = 0.7, 0.3
+"""Part of the first entry's gain from which on another is tried in its place: in general, and in the place of
+a free curve,"""
+TOGETHER, SHAPED = 0.6, 0.95
+"""and the part of the error with the first and its second that the other and its own must not exceed."""
 RIVALS = 2
 """Others tried so at the most."""
 EXCHANGED = 0.93
@@ -76,11 +77,15 @@ class Decision:
     first_look: list[Screened] = field(default_factory=list)
     first_refined: dict[str, float] = field(default_factory=dict)
 
+    def left(self, floor: Floats) -> float:
+        """Return the part of the excess over `floor` that the names leave, of the motion that was seen."""
+        before, after = float(self.base.errors.sum()), float(self.refined.errors.sum())
+        return 1.0 - (before - after) / max(before - float(floor.sum()), 1e-300)
+
     def abstain_if_poor(self, floor: Floats, still_structured: bool) -> None:
         """Take the names back where together they leave too much: the nearest name would be the wrong one."""
-        before, after = float(self.base.errors.sum()), float(self.refined.errors.sum())
-        excess = max(before - float(floor.sum()), 1e-300)
-        explained = (before - after) / excess
+        after = float(self.refined.errors.sum())
+        explained = 1.0 - self.left(floor)
         shapeless = all(c.names[0] in SHAPELESS for c in self.choices)
         enough = POOR if shapeless or not still_structured else ENOUGH
         if explained < enough and after > 6.0 * float(floor.sum()):
@@ -205,7 +210,7 @@ def _look_ahead(
         for r in first.others
         if last(r) not in group
         and last(r) not in SHAPELESS
-        and float(base.errors.sum() - r.errors.sum()) > RIVAL * gain
+        and float(base.errors.sum() - r.errors.sum()) > (HALF if last(best) in SHAPELESS else RIVAL) * gain
     ]
     if not rivals or not _worth_it(base.errors, best.errors, floor):
         return first, None

@@ -14,6 +14,7 @@ from rtcomp.diagnosis.departure import departure
 from rtcomp.diagnosis.extend import extended_stage
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.motion import Motion
+from rtcomp.diagnosis.refine import consistent
 from rtcomp.diagnosis.result import Fit
 from rtcomp.diagnosis.scene import Entry
 from rtcomp.kernels import Floats
@@ -25,8 +26,9 @@ STRUCTURED = 0.3
 HARM, WORSE, HELP = 1.02, 1.1, 0.95
 """Factors on the held-out error of the stage, believed, retuned and (where it is more than the floor) retuned
 again, beyond which names are taken back."""
-LEAST = 0.35
-"""Part of the held-out squared error above the floor that a name with a shape of its own must explain."""
+LEAST, MUCH, OPEN = 0.35, 0.7, 0.2
+"""Part of the held-out squared error above the floor that names with a shape of their own must explain: in
+general, and where they leave more than the part OPEN of the mismatch that was seen."""
 STRAYED = 9.0
 """How much further (see `departure`) than half again the retuning names may take what is believed."""
 AGAIN = 2
@@ -63,6 +65,7 @@ def explain(
         decision = decide(stage, motion, base, least, say, without)
         looks.append((decision.first_look, decision.first_refined))
         decision.first_look, decision.first_refined = looks[0]
+        decision.refined = consistent(decision.refined)
         final = decision.refined.fitted
         if not decision.choices:
             break
@@ -76,8 +79,9 @@ def explain(
         named, own, decision.choices = _fold(stage, final, entries, decision.choices)
         fit = Fit(before, plain, _held_out(own, motion), rest)
         shaped = any(str(e["name"]) not in SHAPELESS for e in entries)
+        least_part = MUCH if decision.left(floor) > OPEN else LEAST
         strays = shaped and departure(final) > 1.5 * departure(base) + STRAYED
-        if not named or (_holds(fit) and not strays and not (shaped and _explains_little(fit))):
+        if not named or (_holds(fit) and not strays and not (shaped and _explains_little(fit, least_part))):
             return Explanation(decision, named, entries, own, final, fit)
         without |= {first}
     # What the ledger gains must hold in the stage itself; else it is not offered as an explanation.
@@ -93,10 +97,10 @@ def _holds(fit: Fit) -> bool:
     return fit.retuned < much or fit.after < HELP * fit.retuned
 
 
-def _explains_little(fit: Fit) -> bool:
+def _explains_little(fit: Fit, least: float) -> bool:
     """Tell whether names explain so little of what was put aside that they are the nearest, not the right."""
     floor = (1.5 * fit.floor) ** 2
-    return fit.retuned**2 > floor and fit.after**2 - floor > (1.0 - LEAST) * (fit.retuned**2 - floor)
+    return fit.retuned**2 > floor and fit.after**2 - floor > (1.0 - least) * (fit.retuned**2 - floor)
 
 
 def _held_out(stage: Stage, motion: Motion) -> float:

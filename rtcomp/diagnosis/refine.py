@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rtcomp.diagnosis.base import Fitted, bounds_of
+from rtcomp.diagnosis.base import FIXED, Fitted, bounds_of
 from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.departure import off
 from rtcomp.diagnosis.ledger import Ledger, System
@@ -115,6 +115,25 @@ def at(entries: Sequence[Entry], knobs: Sequence[Knob], moved: Floats) -> list[E
             low, high = BETWEEN  # its ends are the search's, not refined any more
         out[knob.entry][p.name] = float(np.clip(value, low, high))
     return out
+
+
+def consistent(refined: Refined) -> Refined:
+    """Return `refined` in terms of the friction that it ends with.
+
+    The load's coefficient multiplies over the level of the friction that the columns were made with: at
+    another level the same growth takes another coefficient.
+    """
+    if not any(e["name"] == "load-dependent-friction" for e in refined.entries):
+        return refined
+    ledger, reaches = refined.fitted.ledger, refined.fitted.ledger.reaches
+    now = refined.fitted.coefficients[FIXED : FIXED + reaches.size]
+    ratio = float(now @ reaches) / max(float(ledger.weights @ reaches), 1e-300)
+    ledger.weigh(now)
+    entries = [dict(e) for e in refined.entries]
+    for entry in entries:
+        if entry["name"] == "load-dependent-friction":
+            entry["coefficient"] = ratio * float(entry["coefficient"])  # type: ignore[arg-type]
+    return replace(refined, entries=entries)
 
 
 def evaluate(base: Fitted, entries: Sequence[Entry]) -> tuple[Fitted, Floats]:

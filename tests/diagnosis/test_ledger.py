@@ -7,11 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from recorded import STAGE
+from recorded import STAGE, run, stage, there_and_back
 
 from rtcomp.diagnosis.bank import units_along
+from rtcomp.diagnosis.base import fit_base
+from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.ledger import believed_weights
 from rtcomp.diagnosis.motion import UNSEEN, WASHED, WINDOW_ROWS, WINDOWS, Strip, averaged, prepare
+from rtcomp.diagnosis.refine import consistent, refine
 from rtcomp.kernels import Floats
 from rtcomp.physics import build
 from rtcomp.physics.effect import Place
@@ -135,3 +138,16 @@ def test_a_jump_is_never_put_aside() -> None:
     at = float(kept[block == UNSEEN[1]].mean())
     jumped = replace(motion, jumps=((at, 1e-5),))
     assert set(jumped.unseen) == {UNSEEN[0], UNSEEN[1] + 1, *UNSEEN[2:]}
+
+
+def test_a_loads_coefficient_is_that_of_the_friction_it_ends_with() -> None:
+    """Friction that is believed a fifth too weak: the growth found is the same, the coefficient is not."""
+    truth = {"name": "load-dependent-friction", "coefficient": 0.15}
+    strong = [{**e, "stiffness": 1.2 * e["stiffness"]} for e in STAGE["stage"]["friction"]]
+    axis = Stage.from_dict({**STAGE, "stage": {**STAGE["stage"], "friction": strong, "effects": [truth]}})
+    motion = prepare(stage(), [run(axis, there_and_back(12.0))])
+    start = {**truth, "coefficient": 0.1}
+    base = fit_base(stage(), motion, effects=[effect_of(start)])
+    base.ledger.weigh(believed_weights(stage(), base.ledger.reaches))
+    found = consistent(refine(base, motion, [start]))
+    assert found.entries[0]["coefficient"] == pytest.approx(0.15, rel=0.05)
