@@ -40,6 +40,9 @@ _ROTARY = {
     "N/m": "N m/rad",
     "N s/m": "N m s/rad",
     "N/V": "N m/V",
+    "1/m": "1/rad",
+    "N/m^3": "N m/rad^3",
+    "N s^2/m^2": "N m s^2/rad^2",
 }
 
 

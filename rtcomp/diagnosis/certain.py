@@ -20,6 +20,7 @@ from rtcomp.diagnosis.result import Retuned, Value
 from rtcomp.kernels import Floats
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.stage.stage import Stage
+from rtcomp.units import for_axis
 
 MODEL = 0.015
 """Relative half width of an interval that no data removes: kernels are models, rows are discrete. As much as
@@ -134,7 +135,8 @@ def retunings(
         if i < 3 and old > 0 and abs(abs(new / old - 1.0) / BELIEVED - 1.0) < 0.05:
             half = max(half, BELIEVED * old)  # held there by the belief, not by the recording
         if old > 0 and abs(new / old - 1) > MOVED and abs(new - old) > half:
-            found.append(Retuned(name, float(old), Value(new, new - half, new + half, unit)))
+            value = Value(new, new - half, new + half, for_axis(unit, believed.axis))
+            found.append(Retuned(name, float(old), value))
     return found
 
 

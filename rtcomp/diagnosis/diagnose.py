@@ -39,6 +39,7 @@ from rtcomp.kernels import Floats
 from rtcomp.physics import catalogue
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
+from rtcomp.units import for_axis
 
 AGREES = 0.006
 """Relative force error up to which a recording is held to agree, whatever its noise promises."""
@@ -163,7 +164,8 @@ def _effects(
             value = entry.get(parameter.name)
             if isinstance(value, int | float):
                 low, high = spans.get((at, parameter.name), (float(value), float(value)))
-                values[parameter.name] = Value(float(value), low, high, parameter.unit)
+                unit = for_axis(parameter.unit, base.ledger.stage.axis)
+                values[parameter.name] = Value(float(value), low, high, unit)
         share = float(np.clip(choice.gain / excess, 0.0, 1.0))
         told = _experiment_of(choice)
         found.append(Named(tuple(choice.names), choice.probability, values, share, told, drawn[at]))

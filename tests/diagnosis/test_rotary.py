@@ -1,0 +1,19 @@
+"""A rotary axis is told in its own units."""
+
+from __future__ import annotations
+
+from recorded import STAGE, run, stage, there_and_back
+
+from rtcomp.diagnosis.diagnose import diagnose
+from rtcomp.stage.stage import Stage
+
+
+def test_what_is_retuned_and_named_has_the_units_of_the_axis() -> None:
+    spring = {"name": "parallel-spring", "stiffness": 4000.0}
+    hidden = {**STAGE["stage"], "axis": "rotary", "mass": 2.5, "effects": [spring]}
+    recording = run(Stage.from_dict({**STAGE, "stage": hidden}), there_and_back(20.0))
+    found = diagnose(stage(axis="rotary"), [recording])
+    assert {r.parameter: r.after.unit for r in found.retuned}["mass"] == "kg m^2"
+    (named,) = found.effects
+    assert named.names[0] == "parallel-spring"
+    assert named.parameters["stiffness"].unit == "N m/rad"
