@@ -25,10 +25,10 @@ def run(*command: str, at: Path = TOP, **environment: str) -> subprocess.Complet
 
 def test_make_alone_lists_every_target() -> None:
     listed = [line.split()[1] for line in run("make").stdout.splitlines()]
-    assert listed == ["help", "demo", "test", "prove", "check", "bench", "picture", "clean"]
+    assert listed == ["help", "demo", "test", "prove", "check", "bench", "picture", "firmware", "clean"]
 
 
-@pytest.mark.parametrize("target", ["demo", "test", "prove", "check", "bench", "picture", "clean"])
+@pytest.mark.parametrize("target", ["demo", "test", "prove", "check", "bench", "picture", "firmware", "clean"])
 def test_every_target_knows_what_to_do(target: str) -> None:
     wanted = run("make", "-n", target)
     assert wanted.returncode == 0, wanted.stderr
