@@ -28,7 +28,9 @@ def test_make_alone_lists_every_target() -> None:
     assert listed == ["help", "demo", "test", "prove", "check", "bench", "picture", "firmware", "clean"]
 
 
-@pytest.mark.parametrize("target", ["demo", "test", "prove", "check", "bench", "picture", "firmware", "clean"])
+@pytest.mark.parametrize(
+    "target", ["demo", "test", "prove", "check", "bench", "picture", "firmware", "clean"]
+)
 def test_every_target_knows_what_to_do(target: str) -> None:
     wanted = run("make", "-n", target)
     assert wanted.returncode == 0, wanted.stderr
