@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any
 
 from rtcomp.errors import ConfigError, DeviceError
-from rtcomp.stage.simulate import Simulator
 from rtcomp.stage.stage import Stage
 from rtcomp_drivers.board import BoardFacts
 from rtcomp_drivers.pty_port import PtyPort
+from rtcomp_drivers.warm_stage import warm
 
 _ASKED = struct.Struct("<BQi")
 _MEASURED = struct.Struct("<Bq")
@@ -36,15 +36,6 @@ _PATIENCE_S = 2.0
 _MOST = 4096
 
 
-def ready(stage: Stage, seed: int) -> Simulator:
-    """Return a simulator of `stage` that is compiled: that takes seconds, before anybody waits."""
-    simulator = Simulator(stage, seed=seed)
-    simulator.advance(0.0, 1.0 / stage.rate)
-    simulator.measure()
-    simulator.reset()
-    return simulator
-
-
 class FirmwareServer:
     """Build it, tell `port` to the host, `run` it; as `PlantServer`, with the board in C.
 
@@ -52,7 +43,7 @@ class FirmwareServer:
     """
 
     def __init__(self, stage: Stage, program: Path, seed: int = 0) -> None:
-        self._plant = ready(stage, seed)
+        self._plant = warm(stage, seed)
         self._facts = BoardFacts(axis=stage.axis, voltage_limit=stage.voltage_limit)
         self._time = self._output = 0.0
         self._last_asked = 0.0

@@ -25,8 +25,9 @@ from typing import Any
 from rtcomp.errors import ConfigError, RtcompError
 from rtcomp.stage.stage import Stage
 from rtcomp_drivers.board import Board, BoardFacts
-from rtcomp_drivers.firmware_server import FirmwareServer, ready
+from rtcomp_drivers.firmware_server import FirmwareServer
 from rtcomp_drivers.pty_port import PtyPort
+from rtcomp_drivers.warm_stage import warm
 
 _SLICE_S = 1e-3
 """s, longest wait for a frame before the plant is moved on."""
@@ -67,7 +68,7 @@ class PlantServer:
     """The board and its stage behind a pseudo-terminal. Build it, tell `port` to the host, `run` it."""
 
     def __init__(self, stage: Stage, seed: int = 0, text: str = "rtcomp plant server") -> None:
-        simulator = ready(stage, seed)
+        simulator = warm(stage, seed)
         facts = BoardFacts(axis=stage.axis, voltage_limit=stage.voltage_limit, text=text)
         self.board = Board(simulator, facts)
         self.keeping = Keeping()

@@ -147,6 +147,7 @@ def decide(
     first = {c.names[0] for c in choices}
     for choice in choices:
         choice.names[1:] = [n for n in choice.names[1:] if n not in first]
+        choice.probability = choice.probability if len(choice.names) > 1 else 1.0
     decision.refined, decision.choices = refined, choices
     return decision
 

@@ -11,6 +11,7 @@ import resource
 from collections.abc import Iterator
 from pathlib import Path
 
+from rtcomp.doctor.files import number, text
 from rtcomp.doctor.finding import BAD, GOOD, WEAK, Finding
 from rtcomp.loop.realtime import PRIORITY
 
@@ -71,8 +72,8 @@ def _memory() -> Finding:
 
 def _throttling(root: Path) -> Finding:
     about = "real-time throttling"
-    runtime = _number(root / "proc/sys/kernel/sched_rt_runtime_us")
-    period = _number(root / "proc/sys/kernel/sched_rt_period_us")
+    runtime = number(root / "proc/sys/kernel/sched_rt_runtime_us")
+    period = number(root / "proc/sys/kernel/sched_rt_period_us")
     if runtime is None or period is None or runtime < 0:
         return Finding(about, GOOD, "off" if runtime is not None else "not told by this kernel")
     if runtime < 0.5 * period:
@@ -90,9 +91,9 @@ def _throttling(root: Path) -> Finding:
 
 def _kernel(root: Path) -> Finding:
     about = "kernel"
-    if _text(root / "sys/kernel/realtime") == "1":
+    if text(root / "sys/kernel/realtime") == "1":
         return Finding(about, GOOD, "PREEMPT_RT")
-    version = _text(root / "proc/version") or "unknown"
+    version = text(root / "proc/version") or "unknown"
     kind = next((k for k in ("PREEMPT_RT", "PREEMPT_DYNAMIC", "PREEMPT") if k in version), "no preemption")
     if kind == "PREEMPT_RT":
         return Finding(about, GOOD, kind)
@@ -107,7 +108,7 @@ def _kernel(root: Path) -> Finding:
 
 def _cores(root: Path) -> Finding:
     about, count = "processor cores", len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-    isolated = _text(root / "sys/devices/system/cpu/isolated")
+    isolated = text(root / "sys/devices/system/cpu/isolated")
     if isolated:
         return Finding(about, GOOD, f"{count} to run on; isolated: {isolated}")
     if count < 2:
@@ -129,10 +130,10 @@ def _cores(root: Path) -> Finding:
 
 def _clock(root: Path) -> Finding:
     about, folder = "clock source", root / "sys/devices/system/clocksource/clocksource0"
-    now = _text(folder / "current_clocksource")
+    now = text(folder / "current_clocksource")
     if now is None or now in _FAST:
         return Finding(about, GOOD, now or "not told by this kernel")
-    available = (_text(folder / "available_clocksource") or "").split()
+    available = (text(folder / "available_clocksource") or "").split()
     better = next((c for c in available if c in _FAST), None)
     mend = (
         f"echo {better} | sudo tee /sys/devices/system/clocksource/clocksource0/current_clocksource"
@@ -145,7 +146,7 @@ def _clock(root: Path) -> Finding:
 def _governor(root: Path) -> Finding:
     about = "frequency governor"
     files = sorted((root / "sys/devices/system/cpu").glob("cpu[0-9]*/cpufreq/scaling_governor"))
-    found = sorted({g for f in files if (g := _text(f))})
+    found = sorted({g for f in files if (g := text(f))})
     if not found:
         return Finding(about, GOOD, "none: the frequency is not this system's to choose")
     if found == ["performance"]:
@@ -174,18 +175,3 @@ def _timer_slack() -> Finding:
         "without SCHED_FIFO sleeps end that much late",
         "start without what has set it (systemd: TimerSlackNSec=50us)",
     )
-
-
-def _text(path: Path) -> str | None:
-    try:
-        return path.read_text().strip()
-    except OSError:
-        return None
-
-
-def _number(path: Path) -> int | None:
-    text = _text(path)
-    try:
-        return None if text is None else int(text)
-    except ValueError:
-        return None

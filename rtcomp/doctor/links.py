@@ -7,6 +7,7 @@ import socket
 from collections.abc import Iterator
 from pathlib import Path
 
+from rtcomp.doctor.files import number, text
 from rtcomp.doctor.finding import BAD, GOOD, WEAK, Finding
 
 _ARPHRD_CAN = "280"
@@ -53,10 +54,8 @@ def _serial_ports(root: Path) -> Iterator[Finding]:
 
 
 def _latency(root: Path, name: str, about: str) -> Finding:
-    timer = root / f"sys/class/tty/{name}/device/latency_timer"
-    try:
-        ms = int(timer.read_text())
-    except (OSError, ValueError):
+    ms = number(root / f"sys/class/tty/{name}/device/latency_timer")
+    if ms is None:
         return Finding(about, GOOD, "free")
     if ms <= 1:
         return Finding(about, GOOD, f"free; latency timer {ms} ms")
@@ -85,6 +84,7 @@ def _users(root: Path) -> dict[str, tuple[int, str]]:
 
 
 def _can(root: Path) -> Iterator[Finding]:
+    names = [p.parent.name for p in sorted((root / "sys/class/net").glob("*/type")) if text(p) == _ARPHRD_CAN]
     try:
         socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
     except (AttributeError, OSError):
@@ -95,21 +95,16 @@ def _can(root: Path) -> Iterator[Finding]:
             "socketcan cannot be used; adapters that speak slcan can",
             "sudo modprobe can can_raw",
         )
-        return
-    names = [
-        p.parent.name
-        for p in sorted((root / "sys/class/net").glob("*/type"))
-        if p.read_text().strip() == _ARPHRD_CAN
-    ]
-    if not names:
-        yield Finding("CAN interfaces", GOOD, "none found")
+    else:
+        if not names:
+            yield Finding("CAN interfaces", GOOD, "none found")
     for name in names:
-        about, state = f"CAN interface {name}", root / f"sys/class/net/{name}/operstate"
-        up = state.read_text().strip() in ("up", "unknown")
-        mend = f"sudo ip link set {name} up type can bitrate 1000000"
-        yield (
-            Finding(about, GOOD, "up") if up else Finding(about, BAD, "down", "nothing is heard on it", mend)
-        )
+        about = f"CAN interface {name}"
+        if text(root / f"sys/class/net/{name}/operstate") in ("up", "unknown"):
+            yield Finding(about, GOOD, "up")
+        else:
+            mend = f"sudo ip link set {name} up type can bitrate 1000000"
+            yield Finding(about, BAD, "down", "nothing is heard on it", mend)
 
 
 def _drivers() -> Iterator[Finding]:

@@ -110,6 +110,33 @@ def test_averaged_commands_are_held_from_their_row_on(factor: int) -> None:
         assert strip.voltage[row] == pytest.approx(fine[begin : begin + 100 * factor].mean(), abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    "entry",
+    [
+        {"name": "stribeck", "rise": 0.4, "velocity": 1e-4},
+        {"name": "stiction-ageing", "growth": 0.2, "distance": 2e-6, "onset": 0.01},
+        {"name": "load-dependent-friction", "coefficient": 0.2},
+    ],
+    ids=lambda e: str(e["name"]),
+)
+def test_between_the_ends_stiffness_grows_with_a_part_of_the_level(entry: dict[str, Any]) -> None:
+    """Stuck contacts: the force is the plain one at 0, times the level's growth at 1, its root at a half."""
+    stage = Stage.from_dict(STAGE)
+    time = np.arange(400) / 1000.0
+    x = 2e-6 * np.clip(time / 0.05, 0.0, 1.0)  # well inside the shortest reach, then at rest
+    v, zero, volts = np.gradient(x, time), np.zeros_like(x), np.ones_like(x)
+    drive = [e for e in stage.chain if e.place is Place.DRIVE]
+    found = []
+    for stiffening in (0.0, 0.5, 1.0):
+        chain = [*drive, build({**entry, "stiffening": stiffening}), stage.friction]
+        found.append(forces(stage, chain, time, x, v, zero, volts).friction[-1])  # type: ignore[arg-type]
+    plain = forces(stage, [stage.friction], time, x, v, zero, volts).friction[-1]  # type: ignore[list-item]
+    growth = found[2] / plain
+    assert growth > 1.05
+    assert found[0] == pytest.approx(plain, rel=1e-9)
+    assert found[1] == pytest.approx(plain * np.sqrt(growth), rel=1e-9)
+
+
 def test_contacts_that_stiffen_multiply_the_whole_force() -> None:
     """With `stiffening` 1 presliding and sliding grow alike, without it only the level does."""
     stage = Stage.from_dict(STAGE)

@@ -97,6 +97,19 @@ for f in deadlines(Path("/")):
 """
 
 
+def test_can_interfaces_up_down_and_others(tmp_path: Path) -> None:
+    found = machine(
+        tmp_path,
+        sys__class__net__can0__type="280", sys__class__net__can0__operstate="down",
+        sys__class__net__can1__type="280", sys__class__net__can1__operstate="up",
+        sys__class__net__eth0__type="1", sys__class__net__eth0__operstate="down",
+    )  # fmt: skip
+    down = found["CAN interface can0"]
+    assert down.state == BAD and down.mend == "sudo ip link set can0 up type can bitrate 1000000"
+    assert found["CAN interface can1"].state == GOOD
+    assert "CAN interface eth0" not in found
+
+
 def test_without_rights_it_says_how_to_get_them() -> None:
     """In a process of a user who has none."""
     done = subprocess.run([sys.executable, "-c", AS_NOBODY], capture_output=True, text=True, check=False)

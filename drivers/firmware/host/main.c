@@ -243,6 +243,9 @@ int main(int count, char **arguments)
         } else if (strcmp(name, "--plant") == 0) {
             plant = atoi(value);
         } else if (strcmp(name, "--axis") == 0) {
+            if (strcmp(value, "linear") != 0 && strcmp(value, "rotary") != 0) {
+                return refuse("--axis is linear or rotary, not ", value);
+            }
             facts.axis = strcmp(value, "rotary") == 0 ? RT_ROTARY : RT_LINEAR;
         } else if (strcmp(name, "--limit-uv") == 0) {
             facts.voltage_limit_uv = (uint32_t)strtoul(value, NULL, 10);

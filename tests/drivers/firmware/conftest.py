@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-FIRMWARE = Path(__file__).parents[2] / "drivers" / "firmware"
+FIRMWARE = Path(__file__).parents[3] / "drivers" / "firmware"
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,6 @@ import time
 from pathlib import Path
 
 import pytest
-import yaml
 from rtcomp_drivers.driver import Bench
 from rtcomp_drivers.plant_process import PlantProcess
 from rtcomp_drivers.registry import create
@@ -18,17 +17,6 @@ from rtcomp_drivers.registry import create
 from rtcomp.errors import DeviceError
 from rtcomp.loop.device import OK
 
-STAGE = {
-    "stage": {
-        "mass": 2.0,
-        "force_constant": 4.0,
-        "voltage_limit": 10.0,
-        "viscous": 8.0,
-        "friction": [{"stiffness": 3.2e5, "reach": 1.5e-6}, {"stiffness": 2.2e4, "reach": 3.5e-5}],
-    },
-    "sensor": {"resolution": 1e-8},
-    "rate": 1000.0,
-}
 WATCHDOG_S = 0.1
 HOST = """
 import sys, time
@@ -42,13 +30,6 @@ while True:
     device.exchange(0.5)
     time.sleep(1e-3)
 """
-
-
-@pytest.fixture(scope="module")
-def stage_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("stage") / "stage.yaml"
-    path.write_text(yaml.safe_dump(STAGE))
-    return path
 
 
 def test_the_driver_moves_the_stage_through_it(stage_file: Path, built: Path) -> None:

@@ -1,0 +1,46 @@
+"""Which further names count, and which names do not hold on what was put aside."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rtcomp.diagnosis.decide import _settles_the_rest
+from rtcomp.diagnosis.explain import LEAST, MUCH, _explains_little
+from rtcomp.diagnosis.result import Fit
+from rtcomp.kernels import Floats
+
+BLOCKS = 20
+
+
+def even(total: float) -> Floats:
+    """Squared errors of blocks, all alike but for a little."""
+    chance = np.random.default_rng(5).uniform(0.9, 1.1, BLOCKS)
+    return total * chance / chance.sum()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "counts"),
+    [
+        (1.5, 0.012, True),  # nearly all of the rest, however small beside the first
+        (10.0, 4.0, True),  # large beside the first
+        (8.0, 2.5, True),  # a twentieth of the first, and two thirds of the rest
+        (2.0, 0.9, False),  # trims the first: a hundredth of it, half of the rest
+    ],
+)
+def test_a_further_name_counts_by_what_it_explains_of_the_rest(
+    before: float, after: float, counts: bool
+) -> None:
+    noisy = np.where(np.arange(BLOCKS) % 2, 1.8, 0.2)
+    first, floor = even(100.0), even(0.01)
+    left = even(before) * noisy
+    assert _settles_the_rest(first, left, left * after / before, floor) is counts
+
+
+def test_names_that_leave_much_must_explain_most_of_what_was_put_aside() -> None:
+    half = Fit(0.12, 0.10, 0.07, 0.005)
+    assert _explains_little(half, MUCH) and not _explains_little(half, LEAST)
+    most = Fit(0.12, 0.10, 0.03, 0.005)
+    assert not _explains_little(most, MUCH)
+    nothing_to_explain = Fit(0.006, 0.006, 0.006, 0.005)
+    assert not _explains_little(nothing_to_explain, MUCH)
