@@ -60,7 +60,7 @@ def best_addition(
     tried: list[Refined] = []
     gains: dict[str, float] = {}
     for i, s in enumerate(hopeful):
-        done = _quickly(current, motion, entries, s.entry)
+        done = _quickly(current, motion, entries, s)
         if done is None:
             continue
         gains[last(done)] = 1.0 - float(done.errors.sum() / current.errors.sum())
@@ -88,14 +88,8 @@ def best_addition(
 def _variants(entry: Entry, stage: Stage) -> list[Entry]:
     """Return the forms that an entry comes in, of which a search knows only one; that one first."""
     name = str(entry["name"])
-    if name in ("position-dependent-friction", "load-dependent-friction"):
+    if name == "position-dependent-friction":
         return [entry, {**entry, "stiffening": 1.0}]
-    if name == "frictional-lag" and "stiffening" not in entry:
-        return [entry, {**entry, "stiffening": 1.0}]
-    if name == "stribeck":
-        return [entry, {**entry, "stiffening": 0.5}]
-    if name == "stiction-ageing":
-        return [{**entry, "onset": t, "stiffening": s} for t in (0.1, 0.01) for s in (0.0, 0.7)]
     if name == "backlash" and "contact" not in entry:
         return [entry, {**entry, "share": LOAD_SHARE, "contact": CONTACT}]
     if name == "drive-offset":
@@ -105,10 +99,10 @@ def _variants(entry: Entry, stage: Stage) -> list[Entry]:
     return [entry]
 
 
-def _quickly(current: Fitted, motion: Motion, entries: list[Entry], entry: Entry) -> Refined | None:
-    """Return a few steps of refinement of the best variant of `entry`; None where none can be evaluated."""
+def _quickly(current: Fitted, motion: Motion, entries: list[Entry], screened: Screened) -> Refined | None:
+    """Return a few steps of refinement of the best form of an entry; None where none can be evaluated."""
     found = []
-    for variant in _variants(entry, current.ledger.stage):
+    for variant in [*_variants(screened.entry, current.ledger.stage), *screened.forms]:
         try:
             made = [*entries, variant]
             found.append(refine(current, motion, made, which=[len(entries)], tries=QUICK))

@@ -42,6 +42,9 @@ LEAST_BESIDE = 0.05
 """and part of what those before it explain,"""
 ALL = 0.85
 """unless it explains this part of all that is left: what is wrong with the first is not so well explained."""
+NOISE, STEADILY = 0.7, 0.4
+"""Times the floor that an entry must gain to be worth naming: in general, and where nearly all blocks gain
+and it explains most of what is left."""
 SURE = 8.0
 """Standard errors of what it gains, in nearly all blocks, from which on it counts beside others as well."""
 RIVAL, HALF = 0.7, 0.3
@@ -99,10 +102,12 @@ def decide(
     floor: Floats,
     progress: Progress | None = None,
     without: frozenset[str] = frozenset(),
+    looked_at: bool = False,
 ) -> Decision:
     """Name what is missing; `floor` is the squared error of every seen block if nothing were.
 
-    Names in `without` are not considered.
+    Names in `without` are not considered. With `looked_at` there is something to be explained whatever the
+    floor says.
     """
     entries: list[Entry] = []
     choices: list[Choice] = []
@@ -120,7 +125,7 @@ def decide(
     ahead: Addition | None = None
     greedy: Refined | None = None
     for step in range(MOST):
-        if current.errors.sum() < ABOVE_FLOOR * floor.sum():
+        if current.errors.sum() < ABOVE_FLOOR * floor.sum() and not (looked_at and not entries):
             break
         if entries and current.errors.sum() - floor.sum() < SETTLED * (base.errors.sum() - floor.sum()):
             break
@@ -164,12 +169,13 @@ def _worth_it(before: Floats, after: Floats, floor: Floats) -> bool:
     excess = float(before.sum() - floor.sum())
     broad = helped >= 3 and (float(gained.mean()) > 1.2 * scatter or helped > 0.4 * gained.size)
     plain = share > 0.5 and float(gained.sum()) > 5.0 * float(floor.sum())
+    throughout = helped >= 0.8 * gained.size and float(gained.sum()) > 0.5 * excess
     return (
         share > LEAST_SHARE
         and harmless
         and (broad or plain)
         and float(gained.sum()) > 0.05 * excess
-        and float(gained.sum()) > 0.7 * float(floor.sum())
+        and float(gained.sum()) > (STEADILY if throughout else NOISE) * float(floor.sum())
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from rtcomp.diagnosis.addition import Progress
 from rtcomp.diagnosis.alike import SHAPELESS
 from rtcomp.diagnosis.base import Fitted
-from rtcomp.diagnosis.decide import Choice, Decision, decide
+from rtcomp.diagnosis.decide import ABOVE_FLOOR, Choice, Decision, decide
 from rtcomp.diagnosis.departure import departure
 from rtcomp.diagnosis.extend import extended_stage
 from rtcomp.diagnosis.locate import locate
@@ -21,6 +21,8 @@ from rtcomp.kernels import Floats
 from rtcomp.stage.balance import force_balance
 from rtcomp.stage.stage import Stage
 
+CLEAR = 0.5
+"""Part of the mismatch that depends on one axis, from which on it is looked into however small it is."""
 STRUCTURED = 0.3
 """Part of the remaining mismatch that depends on one axis, from which on names are taken back."""
 HARM, WORSE, HELP = 1.02, 1.1, 0.95
@@ -59,10 +61,13 @@ def explain(
     before, plain = _held_out(stage, motion), _held_out(retuned, motion)
     power = float(base.system.blocks.power[base.ledger.seen].sum())
     rest = float(np.sqrt(floor.sum() / power))
+    # A floor is an expectation: where most of what is left hangs on one thing, it is no noise.
+    small = base.errors.sum() < ABOVE_FLOOR * least.sum()
+    clear = small and any(p.share > CLEAR for p in locate(motion, base.residual, None, seed))
     without: frozenset[str] = frozenset()
     looks = []
     for _ in range(AGAIN + 1):
-        decision = decide(stage, motion, base, least, say, without)
+        decision = decide(stage, motion, base, least, say, without, clear)
         looks.append((decision.first_look, decision.first_refined))
         decision.first_look, decision.first_refined = looks[0]
         decision.refined = consistent(decision.refined)

@@ -73,7 +73,7 @@ def _drawn(
     for k in range(1, x.size):
         base = (x[k] - x[k - 1]) / (h * parts)
         for j in range(parts):
-            at = x[k - 1] + base * (j + 1) * h
+            at = x[k - 1] + base * j * h  # where the load is, too: speeds are half a step on
             friction = 0.0
             for i in range(z.size):
                 friction += stiffness[i] * z[i]

@@ -16,6 +16,7 @@ from rtcomp.diagnosis.scene import Entry
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Parameter, catalogue
+from rtcomp.physics.growing import GROWTH
 
 SCALING = ("drive-gain", "sensor-scale", "inertia")
 """Entries that do what other believed numbers would do together."""
@@ -80,7 +81,7 @@ def knobs_of(entries: Sequence[Entry], motion: Motion, which: Sequence[int] | No
             step = 0.01 * size
             if parameter.name in SEARCHED:
                 continue
-            if parameter.name == "stiffening":
+            if parameter in GROWTH:
                 step = 0.05 if 0.0 < float(value) < 1.0 else 0.0  # else the search has settled it
             elif parameter.name == "period":
                 step = min(0.02 * size, 0.05 * size**2 / (high - low))
@@ -111,7 +112,7 @@ def at(entries: Sequence[Entry], knobs: Sequence[Knob], moved: Floats) -> list[E
             value = max(value, 0.2 * before)  # sizes and times do not change sign
         high = min(p.high, 1e300 if knob.most is None else knob.most)
         low = max(p.low, -1e300)
-        if p.name == "stiffening":
+        if p in GROWTH:
             low, high = BETWEEN  # its ends are the search's, not refined any more
         out[knob.entry][p.name] = float(np.clip(value, low, high))
     return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +20,8 @@ class Screened:
     name: str
     entry: Entry
     errors: Floats
+    forms: tuple[Entry, ...] = ()
+    """The best starting points of its other forms: a few steps tell which is right, a first look does not."""
 
     def gain(self, base: Floats) -> float:
         """Return the part of the base's squared error that is gone."""
@@ -34,7 +36,7 @@ def screen(
     ledger, seen = fitted.ledger, fitted.ledger.seen
     # An entry that shrinks the drive side shrinks every error; all are stated for the believed drive.
     power = float(fitted.system.blocks.power[seen].sum())
-    best: dict[str, Screened] = {}
+    best: dict[tuple[str, bool, bool], Screened] = {}
     others = [effect_of(e) for e in effects]
     all_searches = list(searches(scene))
     for number, search in enumerate(all_searches):
@@ -57,8 +59,19 @@ def screen(
             errors = system.blocks.left_out(seen, fitted.bounds) * scale
         if not np.isfinite(errors).all():
             continue
-        if search.name not in best or errors.sum() < best[search.name].errors.sum():
-            best[search.name] = Screened(search.name, entry, errors)
+        key = (search.name, *_form(entry))
+        if key not in best or errors.sum() < best[key].errors.sum():
+            best[key] = Screened(search.name, entry, errors)
         if progress is not None:
             progress((number + 1) / len(all_searches))
-    return sorted(best.values(), key=lambda b: float(b.errors.sum()))
+    first: dict[str, Screened] = {}
+    for one in sorted(best.values(), key=lambda b: float(b.errors.sum())):
+        known = first.setdefault(one.name, one)
+        if known is not one:
+            first[one.name] = replace(known, forms=(*known.forms, one.entry))
+    return list(first.values())
+
+
+def _form(entry: Entry) -> tuple[bool, bool]:
+    """Say in which of its forms an entry is: whether what sticks follows it, whether its contact is soft."""
+    return bool(entry.get("following")), "contact" in entry

@@ -12,6 +12,10 @@ import numpy as np
 from rtcomp.diagnosis.periodogram import periodogram
 from rtcomp.diagnosis.scene import Entry, Point, Scene
 
+FOLLOWED = {"following": 1.0, "stiffening": 0.5}
+"""Entries that what sticks follows: how much stiffer it becomes begins far from both ends, to be refined."""
+RING_S = 2.0
+"""s of a stretch that a ringing is looked for in."""
 SLOW = 0.5
 """Part of the bandwidth up to which a wave of the reading is taken to be seen as it is."""
 
@@ -41,22 +45,30 @@ def _speed_dependent(s: Scene) -> list[Point]:
     points: list[Entry] = [
         {"name": "stribeck", "rise": rise, "velocity": float(v)} for v in s.speeds(5) for rise in (0.15, 0.5)
     ]
-    for t in (2e-3, 1e-2, 5e-2, 0.2):
-        late: Entry = {"name": "frictional-lag", "time_constant": t}
-        points += [late, {**late, "stiffening": 1.0}]
-    return [Point(p) for p in points]
+    points += [{"name": "frictional-lag", "time_constant": t} for t in (2e-3, 1e-2, 5e-2, 0.2)]
+    return [Point(p) for p in _both_ways(points)]
+
+
+def _both_ways(points: list[Entry]) -> list[Entry]:
+    """Return the entries, and each once more with what sticks following the level, its stiffness refined."""
+    return [*points, *({**p, **FOLLOWED} for p in points)]
 
 
 def _presliding(s: Scene) -> list[Point]:
     reach = float(s.fitted.ledger.reaches.max())
     points: list[Entry] = [{"name": "asymmetric-friction", "asymmetry": a} for a in (-0.2, -0.05, 0.05, 0.2)]
     points += [{"name": "non-congruent-friction", "softening": a} for a in (0.05, 0.2, 0.5)]
-    points += [{"name": "load-dependent-friction", "coefficient": a} for a in (0.03, 0.08, 0.2)]
-    points += [
-        {"name": "stiction-ageing", "growth": g, "distance": d * reach}
-        for g in (0.05, 0.2)
-        for d in (0.1, 1.0)
-    ]
+    points += _both_ways(
+        [
+            *({"name": "load-dependent-friction", "coefficient": a} for a in (0.03, 0.08, 0.2)),
+            *(
+                {"name": "stiction-ageing", "growth": g, "distance": d * reach, "onset": t}
+                for g in (0.05, 0.2)
+                for d in (0.1, 1.0)
+                for t in (0.01, 0.1)
+            ),
+        ]
+    )
     points += [
         {"name": "creep", "fraction": f, "time_constant": t} for f in (0.05, 0.2) for t in (0.03, 0.3, 3.0)
     ]
@@ -82,7 +94,34 @@ def _inertial(s: Scene) -> list[Point]:
             for z in (0.03, 0.15)
             for r in (0.1, 0.5)
         ]
+    for f in _ringing(s):
+        points += [
+            {"name": "resonance", "frequency": f, "damping": z, "mass_ratio": r}
+            for z in (0.03, 0.1)
+            for r in (0.02, 0.1)
+        ]
     return [Point(p) for p in points]
+
+
+def _ringing(s: Scene, peaks: int = 2) -> list[float]:
+    """Return frequencies (Hz) at which the residual rings most: a small mass is seen only near its own.
+
+    The averaged spectrum of stretches as long as RING_S, so that a ringing which comes and goes is one peak.
+    """
+    rate = s.motion.rate / s.motion.thinning
+    size = int(RING_S * rate)
+    stretches = [s.residual[i : i + size] for i in range(0, s.residual.size - size + 1, max(size // 2, 1))]
+    if size < 16 or not stretches:
+        return []
+    power = np.mean(np.abs(np.fft.rfft(np.array(stretches) * np.hanning(size))) ** 2, axis=0)
+    frequency = np.fft.rfftfreq(size, 1 / rate)
+    power[(frequency < 2.0 / RING_S) | (frequency > 1.2 * s.motion.cut)] = 0.0
+    found = []
+    for _ in range(peaks):
+        at = float(frequency[int(np.argmax(power))])
+        found.append(at)
+        power[(frequency > at / 1.3) & (frequency < 1.3 * at)] = 0.0
+    return [f for f in found if f > 0.0]
 
 
 def _sensing(s: Scene) -> list[Point]:

@@ -100,8 +100,10 @@ def backlash(p: Floats, s: Floats, w: Floats) -> None:
     else:
         s[0] -= w[MOVED]
         w[MOVED] = 0.0
-    w[PUSH] -= mass * contact(s[0], s[1] - w[VELOCITY], p[0], omega)
-    w[VELOCITY] = s[1]
+    # Between kicks the speed is a sawtooth; half of the next one gives its middle (Strang 1968).
+    speed = s[1] - 0.5 * h * w[BEHIND] / mass
+    w[PUSH] -= mass * contact(s[0], speed - w[VELOCITY], p[0], omega)
+    w[VELOCITY] = speed
 
 
 @effect_kernel

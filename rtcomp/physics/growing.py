@@ -1,21 +1,36 @@
-"""How the level of friction grows: at equal stiffness, or with the whole force."""
+"""How the level of friction grows: contacts slide later, get stiffer, or bear more where they stand."""
 
 from __future__ import annotations
 
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics.effect import Parameter
-from rtcomp.physics.wires import REACH, SCALE
+from rtcomp.physics.wires import MOVED, REACH, SCALE
 
 STIFFENING = Parameter(
     "stiffening", "1", 0.0, 1.0, "1: contacts that hold more are stiffer, 0: they only hold more", 0.0
 )
+FOLLOWING = Parameter(
+    "following",
+    "1",
+    0.0,
+    1.0,
+    "1: what sticks follows the level at once; as much as it stiffens, if less",
+    0.0,
+)
+GROWTH = (STIFFENING, FOLLOWING)
 
 
 @compiled
-def grow(w: Floats, factor: float, stiffening: float) -> None:
-    """Multiply the level of friction by `factor`, its stiffness by factor^stiffening."""
-    if stiffening > 0.0:
-        shared = factor**stiffening
-        w[SCALE] *= shared
-        factor /= shared
-    w[REACH] *= factor
+def grow(w: Floats, factor: float, stiffening: float, following: float) -> None:
+    """Multiply the level of friction by `factor`, its stiffness by factor^stiffening.
+
+    The force of what sticks is multiplied at once by factor^following; what is left of the level comes with
+    further motion. Contacts whose stiffness grows bear more where they stand: they follow at least as much.
+    """
+    if stiffening == 0.0 and following == 0.0:
+        w[REACH] *= factor
+        return
+    follows = max(following, stiffening)
+    w[SCALE] *= factor**follows
+    w[MOVED] *= factor ** (stiffening - follows)
+    w[REACH] *= factor ** (1.0 - follows)

@@ -5,15 +5,15 @@ from __future__ import annotations
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.growing import STIFFENING, grow
+from rtcomp.physics.growing import GROWTH, grow
 from rtcomp.physics.wires import DRIVE, GRIP_LEVEL, PUSH
 
 
 @effect_kernel
 def load_dependent_friction(p: Floats, s: Floats, w: Floats) -> None:
-    """p: coefficient (1), external (1), stiffening (1)."""
+    """p: coefficient (1), external (1), stiffening (1), following (1)."""
     if w[GRIP_LEVEL] > 0.0:
-        grow(w, 1.0 + abs(p[0] * w[DRIVE] - p[1] * w[PUSH]) / w[GRIP_LEVEL], p[2])
+        grow(w, 1.0 + abs(p[0] * w[DRIVE] - p[1] * w[PUSH]) / w[GRIP_LEVEL], p[2], p[3])
 
 
 @register
@@ -33,7 +33,7 @@ class LoadDependentFriction(Effect):
     parameters = (
         Parameter("coefficient", "1", 0.0, 10.0, "friction force over the force of the drive"),
         Parameter("external", "1", 0.0, 10.0, "the same over weight, springs and other forces", 0.0),
-        STIFFENING,
+        *GROWTH,
     )
     kernel = load_dependent_friction
     says = "friction grows with the force that the drive transmits, as in gears and screws"

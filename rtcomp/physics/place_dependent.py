@@ -8,16 +8,16 @@ from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.drive import PERIOD, PHASE
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.growing import STIFFENING, grow
+from rtcomp.physics.growing import GROWTH, grow
 from rtcomp.physics.wires import POSITION
 
 
 @effect_kernel
 def position_dependent_friction(p: Floats, s: Floats, w: Floats) -> None:
-    """p: amplitude (1), period (m), phase (rad), slope (1/m), stiffening (1)."""
+    """p: amplitude (1), period (m), phase (rad), slope (1/m), stiffening (1), following (1)."""
     x = w[POSITION]
     factor = 1.0 + p[0] * math.sin(2.0 * math.pi * x / p[1] + p[2]) + p[3] * x
-    grow(w, max(factor, 1e-3), p[4])  # friction never drives
+    grow(w, max(factor, 1e-3), p[4], p[5])  # friction never drives
 
 
 @register
@@ -35,7 +35,7 @@ class PositionDependentFriction(Effect):
         PERIOD,
         PHASE,
         Parameter("slope", "1/m", -1e6, 1e6, "relative growth along the stroke", 0.0),
-        STIFFENING,
+        *GROWTH,
     )
     kernel = position_dependent_friction
     says = "contacts yield later in some places than in others: preload, wear, dirt"

@@ -8,7 +8,7 @@ from typing import Final
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.growing import STIFFENING, grow
+from rtcomp.physics.growing import GROWTH, grow
 from rtcomp.physics.wires import GRAIN, GRIP, GRIP_STIFFNESS, MOVED, SCALE, STEP, TIME
 
 FRESH: Final = 0.1
@@ -23,7 +23,7 @@ def friction_drift(p: Floats, s: Floats, w: Floats) -> None:
 
 @effect_kernel
 def stiction_ageing(p: Floats, s: Floats, w: Floats) -> None:
-    """p: growth, distance (m), onset (s), stiffening; s: age (s) of the contacts, place (m) within the grain.
+    """p: growth, distance (m), onset (s), stiffening, following; s: age (s) of contacts, place (m) in grain.
 
     Exact for a step at constant speed.
     """
@@ -32,7 +32,7 @@ def stiction_ageing(p: Floats, s: Floats, w: Floats) -> None:
     slid = abs(inside - s[1]) / p[1]
     renewed = -math.expm1(-slid)
     s[0] += w[STEP] * (renewed / slid if slid > 1e-12 else 1.0) - s[0] * renewed
-    grow(w, 1.0 + p[0] * math.log1p(s[0] / p[2]), p[3])
+    grow(w, 1.0 + p[0] * math.log1p(s[0] / p[2]), p[3], p[4])
 
 
 @effect_kernel
@@ -85,7 +85,7 @@ class StictionAgeing(Effect):
         Parameter("growth", "1", 0.0, 10.0, "relative rise for each e-fold of time at rest"),
         Parameter("distance", "m", 0.0, 1e3, "sliding over which it fades to 1/e", open_low=True),
         Parameter("onset", "s", 0.0, 1e3, "time at rest from which on it grows", FRESH, open_low=True),
-        STIFFENING,
+        *GROWTH,
     )
     kernel = stiction_ageing
     says = "friction at break-away grows with the logarithm of the time at rest, and fades as sliding begins"

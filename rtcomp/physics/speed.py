@@ -7,9 +7,9 @@ import math
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.growing import STIFFENING, grow
+from rtcomp.physics.growing import GROWTH, grow
 from rtcomp.physics.level import speed_midway, viscous_speed
-from rtcomp.physics.wires import FRICTION, LATE, SKEW, STEP, STIFFENS, VELOCITY
+from rtcomp.physics.wires import FOLLOWS, FRICTION, LATE, SKEW, STEP, STIFFENS, VELOCITY
 
 
 @effect_kernel
@@ -27,9 +27,10 @@ def micro_damping(p: Floats, s: Floats, w: Floats) -> None:
 
 @effect_kernel
 def stribeck(p: Floats, s: Floats, w: Floats) -> None:
-    """p: rise (1), velocity (m/s), stiffening (1)."""
+    """p: rise (1), velocity (m/s), stiffening (1), following (1)."""
     ratio = speed_midway(w) / p[1]
-    grow(w, 1.0 + p[0] * math.exp(-ratio * ratio), max(p[2], w[STIFFENS]))
+    factor = 1.0 + p[0] * math.exp(-ratio * ratio)
+    grow(w, factor, max(p[2], w[STIFFENS]), max(p[3], w[FOLLOWS]))
 
 
 @effect_kernel
@@ -40,7 +41,7 @@ def asymmetric_viscous(p: Floats, s: Floats, w: Floats) -> None:
 
 @effect_kernel
 def frictional_lag(p: Floats, s: Floats, w: Floats) -> None:
-    """p: time constant (s), stiffening (1); s: lagged velocity, velocity at the last call (m/s).
+    """p: time constant (s), stiffening, following; s: lagged velocity, velocity at the last call (m/s).
 
     Exact for a velocity that changes linearly over the step.
     """
@@ -52,7 +53,7 @@ def frictional_lag(p: Floats, s: Floats, w: Floats) -> None:
         s[0] = v + (s[0] - s[1]) * keep - (v - s[1]) * -math.expm1(-h / p[0]) * p[0] / h
     s[1] = v
     w[LATE] = v - s[0]
-    w[STIFFENS] = p[1]
+    w[STIFFENS], w[FOLLOWS] = p[1], p[2]
 
 
 @effect_kernel
@@ -131,7 +132,8 @@ class MicroDamping(Effect):
 class Stribeck(Effect):
     """Friction that falls with speed from its static level.
 
-    With `stiffening` 0 what sticks keeps its force while the level changes, with 1 the whole force follows.
+    What sticks keeps its force while the level changes; with `following` 1 it follows at once, with
+    `stiffening` 1 its stiffness does too.
     """
 
     name = "stribeck"
@@ -139,7 +141,7 @@ class Stribeck(Effect):
     parameters = (
         Parameter("rise", "1", -0.9, 10.0, "static over sliding level, less one"),
         Parameter("velocity", "m/s", 0.0, 1e3, "speed at which the rise has fallen to 1/e", open_low=True),
-        STIFFENING,
+        *GROWTH,
     )
     kernel = stribeck
     says = "friction falls with speed from its static level: the yield level is higher near rest"
@@ -184,15 +186,15 @@ class FrictionalLag(Effect):
     Viscous and quadratic friction and every level that falls with speed (`stribeck`, and that of lugre, gms,
     leuven and modified-leuven, beside what lag these have of themselves) take the lagged speed; damping of
     the contacts does not. `dahl` and stop elements alone have nothing that depends on speed. With
-    `stiffening` 1 the whole force of friction follows a level of `stribeck` that changes late, also while it
-    sticks.
+    `following` 1 what sticks follows a level of `stribeck` that changes late, with `stiffening` 1 its
+    stiffness does too.
     """
 
     name = "frictional-lag"
     place = Place.FRICTION
     parameters = (
         Parameter("time_constant", "s", 0.0, 1e2, "with which friction follows speed"),
-        STIFFENING,
+        *GROWTH,
     )
     kernel = frictional_lag
     says = "the speed-dependent part of friction follows speed late, as the lubricant film builds up"

@@ -5,9 +5,9 @@ opposes motion. All SI.
 
 Who drives the chain resets before each step what effects add to (DRIVE, PUSH, FRICTION: 0), multiply (REACH,
 SCALE: 1) and take from the stage (MASS, GAIN). GRIP, GRIP_LEVEL, GRIP_STIFFNESS and BEHIND stay from step to
-step: written late in the chain, they are read before that at the next step (0 at first). LATE, SKEW and
-STIFFENS are written by their one effect at each step and are 0 without it. A stage has one friction model; of
-two, the later one's GRIP would be read.
+step: written late in the chain, they are read before that at the next step (0 at first). LATE, SKEW,
+STIFFENS and FOLLOWS are written by their one effect at each step and are 0 without it. A stage has one
+friction model; of two, the later one's GRIP would be read.
 """
 
 from __future__ import annotations
@@ -37,5 +37,6 @@ LATE = 20  # m/s, how far the speed that speed-dependent friction sees is behind
 SKEW = 21  # 1, speed-dependent friction is 1 + SKEW times larger forward, 1 - SKEW backward
 GRAIN = 22  # m, motion smaller than this is the sensor's noise; 0 in simulation
 STIFFENS = 23  # 1, how much levels that change late stiffen what sticks: 0 they only hold more, 1 all grows
+FOLLOWS = 24  # 1, how much what sticks follows such levels at once
 
-COUNT = 24
+COUNT = 25

@@ -131,6 +131,7 @@ def _along(
 
     Where effects are so `fast` that they change within a row, also the weighed means of the others' force.
     """
+    last = 0.0
     for k in range(motion.shape[0]):
         drive = 0.0
         for j in range(1, parts + 1):
@@ -139,7 +140,10 @@ def _along(
             run_chain(steps, p, s, w, 0, steps[0])
             drive += w[DRIVE] / parts
             if fast:
-                share = (w[PUSH] - w[FRICTION]) / parts
+                # Forces are those at the end of a part: over it, the mean of both its ends.
+                now = w[PUSH] - w[FRICTION]
+                share = 0.5 * (last + now) / parts
+                last = now
                 out[4, k] += share * (j - 0.5) / parts
                 out[5, k] += share * (1.0 - (j - 0.5) / parts)
         out[0, k], out[1, k], out[2, k], out[3, k] = drive, w[PUSH], w[FRICTION], w[MASS]

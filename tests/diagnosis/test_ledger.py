@@ -156,6 +156,21 @@ def test_contacts_that_stiffen_multiply_the_whole_force() -> None:
     assert found[0.0][~sliding] != pytest.approx((factor * plain)[~sliding], rel=1e-3)
 
 
+def test_contacts_that_follow_keep_their_stiffness() -> None:
+    """With `following` 1 the force is g h(xi) with d xi = dx / g, for a level that goes as g."""
+    stage = Stage.from_dict(STAGE)
+    time, x = wander()
+    v = np.gradient(x, time)
+    zero = np.zeros_like(x)
+    entry = {"name": "position-dependent-friction", "amplitude": 0.3, "period": 2e-5, "phase": 0.4}
+    level = 1.0 + 0.3 * np.sin(2 * np.pi * x / 2e-5 + 0.4)
+    inner = np.cumsum(np.diff(x, prepend=0.0) / level)
+    plain = forces(stage, [stage.friction], time, inner, v, zero, zero).friction  # type: ignore[list-item]
+    chain = [build({**entry, "following": 1.0}), stage.friction]
+    found = forces(stage, chain, time, x, v, zero, zero).friction  # type: ignore[arg-type]
+    assert found == pytest.approx(level * plain, rel=1e-9)
+
+
 def test_a_jump_is_never_put_aside() -> None:
     """It happens once: in a stretch that nothing may look at, it could not be found."""
     time, x = wander()
