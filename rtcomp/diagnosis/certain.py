@@ -89,7 +89,8 @@ def intervals(
         )
         size = 2.0 if knob.parameter.name == "phase" else abs(value)
         half = worse * float(np.sqrt((factor * sd * knob.step) ** 2 + grid**2 + (MODEL * size) ** 2))
-        found[knob.entry, knob.parameter.name] = (value - half, value + half)
+        low, high = knob.parameter.low, knob.parameter.high  # what it may be at all
+        found[knob.entry, knob.parameter.name] = (max(value - half, low), min(value + half, high))
     return found
 
 

@@ -49,8 +49,9 @@ OPEN = 4.0
 """Squared error over the floor's, from which on something remains that no entry explains."""
 LOUD = 0.03
 """Relative force error left by noise and method, from which on forces decide nothing where an axis sticks."""
-KEPT = 0.9
-"""Factor on the held-out error below which a retuned stage is given in place of the believed one."""
+KEPT, CLEARLY = 0.9, 0.6
+"""Factors on the held-out error below which a retuned stage is given in place of the believed one: where it
+explains what was seen, and where much is left open, whose cause it would only have bent to."""
 ROUGH = (0.75, 1.0, 1.3)
 """Factors on the believed reaches with which the place of the mismatch is looked for at first."""
 
@@ -92,7 +93,7 @@ def diagnose(
     told = explain(stage, motion, base, floor, least, say, seed)
     decision, named, final, fit = told.decision, told.named, told.final, told.fit
     extended, entries_found = told.stage, told.entries
-    if not named and fit.after > KEPT * fit.before:
+    if not named and fit.after > (CLEARLY if _open(final, least) else KEPT) * fit.before:
         extended = stage
         fit = Fit(fit.before, fit.retuned, fit.before, fit.floor)
     say(0.4, "locate")
@@ -182,12 +183,17 @@ def _experiment_of(choice: Choice) -> str:
     return "; ".join(f"{n}: {catalogue.entry(n).experiment}" for n in choice.names)
 
 
+def _open(final: Fitted, least: Floats) -> bool:
+    """Tell whether a fit leaves more than noise, method and what beliefs may be wrong by."""
+    power = float(final.system.blocks.power[final.ledger.seen].sum())
+    return float(final.errors.sum()) > max(OPEN * float(least.sum()), AGREES**2 * power)
+
+
 def _verdict(effects: list[Named], final: Fitted, floor: Floats, least: Floats, fit: Fit) -> Verdict:
     if effects:
         return "missing-physics"
     left = float(final.errors.sum())
-    power = float(final.system.blocks.power[final.ledger.seen].sum())
-    if left > max(OPEN * float(least.sum()), AGREES**2 * power):
+    if _open(final, least):
         return "unexplained"
     if fit.before > 1.25 * fit.after and fit.before > AGREES:
         return "retuned"
