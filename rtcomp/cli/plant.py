@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from rtcomp_drivers.plant_links import LINKS
 
 
 @click.group()
@@ -19,7 +20,14 @@ def plant() -> None:
 
 @plant.command()
 @click.option("--config", required=True, type=click.Path(path_type=Path), help="Stage file or configuration.")
-@click.option("--serial", "link", flag_value="serial", default="serial", help="Speak the serial protocol.")
+@click.option(
+    "--link",
+    type=click.Choice(list(LINKS)),
+    default="serial",
+    show_default=True,
+    help="What it speaks; CAN links come as an slcan adapter's port.",
+)
+@click.option("--serial", "link", flag_value="serial", help="The same as --link serial.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the simulated noise.")
 @click.option("--json", "as_json", is_flag=True, help="Print the port as JSON.")
 @click.option("--log", type=click.Path(path_type=Path), help="File for the summary at exit, else stderr.")
@@ -33,8 +41,9 @@ def serve(config: Path, link: str, seed: int, as_json: bool, log: Path | None, f
     zero and it has to be armed anew.
 
     \b
-    Example:
+    Examples:
       rtcomp plant serve --config configs/leuven.yaml --serial
+      rtcomp plant serve --config configs/leuven.yaml --link odrive-can
     """
     from rtcomp_drivers.plant_server import serve as run
 
