@@ -251,15 +251,16 @@ def _after(due: float, period: float, now: float) -> float:
     return due + period * (math.floor((now - due) / period) + 1)
 
 
-def odrive_side(plant: Plant, stage: Stage) -> SlcanSide:
+def odrive_side(plant: Plant, stage: Stage, watchdog: float = 0.1) -> SlcanSide:
     """Build an ODrive whose motor moves `stage`, on a bus at 1 Mbit/s behind an slcan adapter.
 
     A linear stage moves 1 mm a turn, through a screw without losses: 1 Nm makes 2 pi / lead N. What drives
-    the stage's model is the voltage that gives this force.
+    the stage's model is the voltage that gives this force. `watchdog` in s.
     """
     turn = LEAD if stage.axis == "linear" else 2.0 * math.pi
     volts_per_torque = 2.0 * math.pi / turn / stage.force_constant
     facts = AxisFacts(
+        watchdog=watchdog,
         turn=turn,
         volts_per_torque=volts_per_torque,
         torque_limit=stage.voltage_limit / abs(volts_per_torque),

@@ -11,6 +11,7 @@ from rtcomp.errors import ConfigError, DeviceBusyError, DeviceError, DeviceTimeo
 from rtcomp.loop.device import INVALID, OK, STALE, Sample
 from rtcomp_drivers import cansimple as c
 from rtcomp_drivers.bus_budget import Traffic, check_budget
+from rtcomp_drivers.can_link import check_interface
 from rtcomp_drivers.cansimple import CLOSED_LOOP, IDLE, Command
 from rtcomp_drivers.driver import Bench, Driver, check_volts
 from rtcomp_drivers.odrive_link import HEARTBEATS_S, OdriveLink
@@ -42,6 +43,7 @@ class OdriveDriver(Driver):
         """V, the command that was in force when the newest sample was asked for."""
         self.disarmed: bool | None = None
         """After close: whether the axis confirmed that it is idle."""
+        check_interface(settings)
         rate = 1.0 / bench.period
         if settings.watchdog < 2.0 * bench.period:
             least = f"two periods ({2 * bench.period:g} s)"

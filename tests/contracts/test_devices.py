@@ -54,14 +54,14 @@ def plant(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def odrive(tmp_path_factory):
-    with _serving(tmp_path_factory, "odrive-can") as process:
+    with _serving(tmp_path_factory, "odrive-can", watchdog=1.0) as process:
         yield process
 
 
-def _serving(tmp_path_factory, link):
+def _serving(tmp_path_factory, link, **more):
     path = tmp_path_factory.mktemp("devices") / "stage.yaml"
     path.write_text(yaml.safe_dump(STAGE))
-    return PlantProcess(path, link=link)
+    return PlantProcess(path, link=link, **more)
 
 
 @pytest.fixture(params=KINDS)
@@ -81,8 +81,8 @@ def bed(request):
         settings |= {"port": port, "watchdog": 1.0, "reply_timeout": 0.2}
     elif kind == "odrive-can":
         port = request.getfixturevalue("odrive").port
-        settings |= {"interface": "slcan", "channel": port, "lead": 1e-3, "reply_timeout": 0.2}
-        settings |= {"clear_fault": True}  # of a watchdog of 0.1 s, on a busy machine
+        settings |= {"interface": "slcan", "channel": port, "lead": 1e-3}
+        settings |= {"watchdog": 1.0, "check_watchdog": False, "reply_timeout": 0.2}
     device = create(settings, Bench(**bench))
     yield Bed(device, kind)
     device.close()

@@ -104,7 +104,7 @@ def test_a_bit_rate_that_is_too_low_is_refused_before_anything_is_opened(bitrate
 
 
 def test_settings_that_make_no_sense(stage):
-    with pytest.raises(ConfigError, match="lead is missing"):
+    with pytest.raises(ConfigError, match=r"device\.lead: is missing"):
         odrive("x", Bench(stage=stage))
     with pytest.raises(ConfigError, match="watchdog"):
         odrive("x", Bench(period=0.1), watchdog=0.05)
@@ -117,7 +117,7 @@ def test_settings_that_make_no_sense(stage):
     with pytest.raises(ConfigError, match="channel"):
         create({"driver": "odrive-can", "interface": "slcan"}, BENCH)
     with pytest.raises(ConfigError, match="sclan"):
-        odrive("x", interface="sclan").open()
+        odrive("x", interface="sclan")
 
 
 def test_firmware_that_is_another(pty_axis):
@@ -253,10 +253,12 @@ def test_the_watchdog_is_proven_and_one_that_is_off_or_longer_is_refused(pty_axi
 def test_an_axis_that_does_not_close_its_loop(axis):
     axis.to_axis = lambda frames: [f for f in frames if f.data != c.encode_state(CLOSED_LOOP)]
     refused(DeviceError, axis.port, "does not close its loop", "calibrated", check_watchdog=True)
-    with odrive(axis.port) as device, pytest.raises(DeviceError, match="does not close its loop; it is IDLE"):
-        for _ in range(1000):
-            device.exchange(0.1)
-            time.sleep(1e-3)
+    with odrive(axis.port, heartbeat_timeout=0.8) as device:
+        with pytest.raises(DeviceError, match="does not close its loop; it is IDLE"):
+            for _ in range(10_000):
+                device.exchange(0.1)
+                time.sleep(1e-3)
+        assert axis.axis.torque == 0.0
 
 
 def test_until_the_first_exchange_nothing_is_armed_and_arming_moves_nothing(axis):
