@@ -75,9 +75,9 @@ LINES = st.one_of(
 
 
 @settings(deadline=None)
-@given(st.lists(LINES, max_size=30))
-def test_it_answers_every_line_once_and_takes_only_frames(lines):
-    adapter = SlcanAdapter()
+@given(st.lists(LINES, max_size=30), st.booleans())
+def test_it_answers_every_line_once_and_takes_only_frames(lines, is_open):
+    adapter = opened() if is_open else SlcanAdapter()
     for line in lines:
         ended = line.count(b"\r") + 1
         was_open = adapter.open
