@@ -68,6 +68,7 @@ def test_frames_get_through_whole_however_the_line_is_cut_up(sent, size):
 
 LINES = st.one_of(
     st.binary(max_size=40),
+    st.just(b"t" * 1000),
     st.sampled_from([*BIT_RATES, b"O", b"C", b"L", b"V", b"N", b"F", b"Z0", b"Z1", b"X1", b"M00000000", b""]),
     frames().map(lambda f: encode(f)[:-1]),
     st.tuples(frames(), st.integers(0, 26)).map(lambda t: encode(t[0])[: t[1]]),
