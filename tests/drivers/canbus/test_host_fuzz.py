@@ -53,7 +53,7 @@ def test_only_whole_frames_come_out(size):
 
     lines = stream.replace(b"\a", b"\r").split(b"\r")
     expected = [f for f in map(decode, lines) if f is not None]
-    thread = threading.Thread(target=feed)
+    thread = threading.Thread(target=feed, daemon=True)
     thread.start()
     got = 0
     while (message := link.can.receive(20.0)) is not None:

@@ -161,7 +161,7 @@ def test_an_axis_that_somebody_else_has(axis):
             axis.to_axis([])
             axis.axis._fed = axis.axis.time
 
-    thread = threading.Thread(target=master)
+    thread = threading.Thread(target=master, daemon=True)
     thread.start()
     refused(DeviceBusyError, axis.port, "CLOSED_LOOP_CONTROL", "another master")
     feeding.set()
@@ -185,7 +185,7 @@ def test_a_second_master_is_noticed_before_and_while_running(axis, frame):
         while not stop.wait(0.02):
             axis.inject(frame)
 
-    thread = threading.Thread(target=speak)
+    thread = threading.Thread(target=speak, daemon=True)
     thread.start()
     refused(DeviceBusyError, axis.port, "only one master")
     stop.set()
