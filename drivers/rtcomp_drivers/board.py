@@ -12,11 +12,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from rtcomp_drivers import protocol
 from rtcomp_drivers.protocol import ARMED, DISARMED, FAULT
 from rtcomp_drivers.quality import LinkQuality
+
+if TYPE_CHECKING:
+    from rtcomp.stage.stage import Stage
 
 MAX_WATCHDOG_MS = 10_000
 _HALF = 1 << 31
@@ -152,6 +155,16 @@ class Board:
             self._zero("shut down", now)
             self.state = DISARMED
 
+    def summary(self) -> dict[str, Any]:
+        """Return what happened, for a log; times in s on the board's clock."""
+        return {
+            "frames": self.decoder.good,
+            "bad_frames": self.decoder.bad,
+            "unknown_frames": self.decoder.unknown,
+            **self.counters,
+            "zeroings": [z._asdict() for z in self.zeroings],
+        }
+
     def _pass_time(self, until: float) -> None:
         seconds = until - self.time
         if seconds > 0.0:
@@ -243,3 +256,10 @@ class Board:
         self.counters["zeroed"] += 1
         if len(self.zeroings) < _KEPT:
             self.zeroings.append(Zeroing(self.time, cause, self.time - self._fed, now - self.time))
+
+
+def board_side(plant: Plant, stage: Stage) -> Board:
+    """Build the board in front of a plant, with the stage's axis and voltage limit."""
+    return Board(
+        plant, BoardFacts(axis=stage.axis, voltage_limit=stage.voltage_limit, text="rtcomp plant server")
+    )

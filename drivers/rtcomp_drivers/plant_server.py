@@ -1,10 +1,10 @@
 """A stage in a process of its own, in real time, behind a pseudo-terminal: it stands in for hardware.
 
-    python -m rtcomp_drivers.plant_server --config STAGE.yaml --serial
+    python -m rtcomp_drivers.plant_server --config STAGE.yaml --link serial
 
-prints the port to give to the driver ``serial`` and runs until SIGINT or SIGTERM. The stage moves by the
-server's monotonic clock whether a host talks to it or not; the board in front of it (rtcomp_drivers.board)
-has the states and the watchdog that a real one has.
+prints the port to give to the driver of the same name and runs until SIGINT or SIGTERM. The stage moves by
+the server's monotonic clock whether a host talks to it or not; the device in front of it (serial:
+rtcomp_drivers.board; CAN: a drive behind an slcan adapter) has the states and the watchdog of a real one.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from typing import Any
 
 from rtcomp.errors import ConfigError, RtcompError
 from rtcomp.stage.stage import Stage
-from rtcomp_drivers.board import Board, BoardFacts
 from rtcomp_drivers.firmware_server import FirmwareServer
+from rtcomp_drivers.plant_links import LINKS, build
 from rtcomp_drivers.pty_port import PtyPort
 from rtcomp_drivers.warm_stage import warm
 
@@ -65,12 +65,15 @@ class Keeping:
 
 
 class PlantServer:
-    """The board and its stage behind a pseudo-terminal. Build it, tell `port` to the host, `run` it."""
+    """A device's side and its stage behind a pseudo-terminal. Build it, tell `port` to the host, `run` it.
 
-    def __init__(self, stage: Stage, seed: int = 0, text: str = "rtcomp plant server") -> None:
-        simulator = warm(stage, seed)
-        facts = BoardFacts(axis=stage.axis, voltage_limit=stage.voltage_limit, text=text)
-        self.board = Board(simulator, facts)
+    Raises ConfigError for a link that it does not speak, DeviceError where no port is to be had.
+    """
+
+    def __init__(
+        self, stage: Stage, seed: int = 0, link: str = "serial", watchdog: float | None = None
+    ) -> None:
+        self.side = build(link, warm(stage, seed), stage, watchdog)
         self.keeping = Keeping()
         self.unsent = 0
         """Bytes that no host read."""
@@ -90,10 +93,10 @@ class PlantServer:
         `lifeline` is the descriptor of a pipe at whose end-of-file the server ends too: that comes when the
         process that holds its other end has ended, however it did.
         """
-        board, keeping, master = self.board, self.keeping, self._port.master
+        side, keeping, master = self.side, self.keeping, self._port.master
         watched = [master] if lifeline is None else [master, lifeline]
         clock, wait, read = time.monotonic, select.select, os.read
-        self.started = clock() - board.time
+        self.started = clock() - side.time
         keeping._begin = clock()
         try:
             while not self._stopped:
@@ -103,19 +106,19 @@ class PlantServer:
                     break
                 self._catch_up(arrived)
                 data = read(master, _MOST) if master in ready else b""
-                now = max(arrived - self.started, board.time)
-                answer = board.receive(data, now) if data else board.run_until(now)
+                now = max(arrived - self.started, side.time)
+                answer = side.receive(data, now) if data else side.run_until(now)
                 if answer:
                     self._send(answer)
                 ended = clock()
-                lag = ended - self.started - board.time
+                lag = ended - self.started - side.time
                 if lag > keeping.max_step_lag_s:
                     keeping.max_step_lag_s = lag
-                board.lagging = lag > _LAGGING_S
+                side.lagging = lag > _LAGGING_S
                 if keeping.count(arrived, ended):
                     self._say_too_slow()
         finally:
-            board.shut_down(max(board.time, min(clock() - self.started, board.time + _SLICE_S)))
+            side.shut_down(max(side.time, min(clock() - self.started, side.time + _SLICE_S)))
             self._port.close()
 
     def _send(self, answer: bytes) -> None:
@@ -131,15 +134,15 @@ class PlantServer:
         What is then still missing is skipped, and counted: a simulation that is too slow, or a process
         that was stopped for an hour, must not make a server that hears nobody.
         """
-        board = self.board
-        behind = arrived - self.started - board.time
+        side = self.side
+        behind = arrived - self.started - side.time
         if behind <= 2 * _SLICE_S:
             return
         while behind > _SLICE_S and time.monotonic() - arrived < _BUDGET_S:
-            answer = board.run_until(board.time + _SLICE_S)
+            answer = side.run_until(side.time + _SLICE_S)
             if answer:
                 self._send(answer)
-            behind = arrived - self.started - board.time
+            behind = arrived - self.started - side.time
         if behind > _SLICE_S:
             self.started += behind
             self.keeping.lost_s += behind
@@ -154,17 +157,13 @@ class PlantServer:
 
     def summary(self) -> dict[str, Any]:
         """Return what happened, for the log; times in s on the board's clock."""
-        board, keeping = self.board, self.keeping
+        side, keeping = self.side, self.keeping
         return {
             "port": self.port,
             "started_monotonic_s": self.started,
-            "seconds": board.time,
-            "frames": board.decoder.good,
-            "bad_frames": board.decoder.bad,
-            "unknown_frames": board.decoder.unknown,
-            **board.counters,
+            "seconds": side.time,
+            **side.summary(),
             "unsent_bytes": self.unsent,
-            "zeroings": [z._asdict() for z in board.zeroings],
             "max_step_lag_s": keeping.max_step_lag_s,
             "lost_s": keeping.lost_s,
             "seconds_too_slow": keeping.seconds_too_slow,
@@ -182,9 +181,11 @@ def serve(
     realtime: bool = True,
     until_eof: bool = False,
     firmware: Path | None = None,
+    watchdog: float | None = None,
 ) -> dict[str, Any]:
     """Run `stage` behind a port until SIGINT or SIGTERM; return the summary that is also written.
 
+    `watchdog` (s) is that of a drive on which it is set beforehand (CAN).
     With `firmware`, the program that drivers/firmware makes for this machine, the board is that program in a
     process of its own, and this one is only what hangs on it.
 
@@ -194,9 +195,15 @@ def serve(
     Raises ConfigError for a link that it does not speak and DeviceError where the port cannot be had. Call
     it from the main thread: it sets signal handlers.
     """
-    if link != "serial":
-        raise ConfigError(f"plant server: unknown link {link!r}; it serves 'serial'")
-    server = PlantServer(stage, seed=seed) if firmware is None else FirmwareServer(stage, firmware, seed=seed)
+    server: PlantServer | FirmwareServer
+    if firmware is None:
+        server = PlantServer(stage, seed=seed, link=link, watchdog=watchdog)
+    elif watchdog is not None:
+        raise ConfigError("plant server: the host sets a board's watchdog; leave --watchdog out")
+    elif link == "serial":
+        server = FirmwareServer(stage, firmware, seed=seed)
+    else:
+        raise ConfigError(f"plant server: --firmware is a board on the link 'serial', not on {link!r}")
 
     def end(_signal: int, _frame: FrameType | None) -> None:
         server.stop()
@@ -262,8 +269,9 @@ def main(arguments: list[str] | None = None) -> int:
     says = (__doc__ or "").split("\n")[0]
     parser = argparse.ArgumentParser(prog="python -m rtcomp_drivers.plant_server", description=says)
     parser.add_argument("--config", type=Path, required=True, help="stage file or run configuration")
+    parser.add_argument("--link", choices=sorted(LINKS), default="serial", help="what it speaks")
     parser.add_argument(
-        "--serial", action="store_true", help="speak the serial protocol, the only link there is"
+        "--serial", dest="link", action="store_const", const="serial", help="the same as --link serial"
     )
     parser.add_argument("--json", action="store_true", help="print the port as a JSON object")
     parser.add_argument("--log", type=Path, help="write the summary to this file instead of stderr")
@@ -273,16 +281,21 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--until-eof", action="store_true", help="end at the end of standard input too: with who started it"
     )
+    parser.add_argument(
+        "--watchdog", type=float, help="s, of a drive that has its own (CAN); on serial the host sets it"
+    )
     options = parser.parse_args(arguments)
     try:
         serve(
             Stage.load(options.config),
+            link=options.link,
             seed=options.seed,
             as_json=options.json,
             log=options.log,
             realtime=not options.no_realtime,
             until_eof=options.until_eof,
             firmware=options.firmware,
+            watchdog=options.watchdog,
         )
     except RtcompError as error:
         print(f"error: {error}", file=sys.stderr)
