@@ -8,12 +8,14 @@ from __future__ import annotations
 import itertools
 import math
 import time
+from contextlib import ExitStack
 from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
+from rtcomp_drivers.cia402_states import State
 from rtcomp_drivers.driver import Bench
 from rtcomp_drivers.plant_process import PlantProcess
 from rtcomp_drivers.protocol import DISARMED
@@ -29,7 +31,9 @@ STAGE = {
     "sensor": {"resolution": 1e-9},
     "rate": 1.0 / PERIOD,
 }
-KINDS = ["simulated", "simulated, delayed", "replay", "serial"]
+KINDS = ["simulated", "simulated, delayed", "replay", "serial", "cia402"]
+REAL = {"serial": {}, "cia402": {"interface": "slcan", "node": 5}}
+"""Drivers with a plant server behind them, and their settings besides its port."""
 
 
 @dataclass
@@ -40,17 +44,25 @@ class Bed:
     kind: str
 
     def tick(self, volts: float) -> Sample:
-        if self.kind == "serial":
+        if self.kind in REAL:
             time.sleep(PERIOD)
         return self.device.exchange(volts)
 
 
 @pytest.fixture(scope="module")
-def plant(tmp_path_factory):
+def plants(tmp_path_factory):
+    """Plant servers by link, started when asked for."""
     path = tmp_path_factory.mktemp("devices") / "stage.yaml"
     path.write_text(yaml.safe_dump(STAGE))
-    with PlantProcess(path) as process:
-        yield process
+    started = {}
+
+    def plant(link):
+        if link not in started:
+            started[link] = stack.enter_context(PlantProcess(path, link=link))
+        return started[link]
+
+    with ExitStack() as stack:
+        yield plant
 
 
 @pytest.fixture(params=KINDS)
@@ -65,9 +77,10 @@ def bed(request):
         bench["recording"] = SimpleNamespace(
             columns={"time": t, "position": 1e-4 * np.sin(9 * t), "voltage": np.cos(9 * t)}
         )
-    elif kind == "serial":
-        port = request.getfixturevalue("plant").port
-        settings |= {"port": port, "watchdog": 1.0, "reply_timeout": 0.2}
+    elif kind in REAL:
+        port = request.getfixturevalue("plants")(kind).port
+        place = "port" if kind == "serial" else "channel"
+        settings |= {place: port, "watchdog": 1.0, "reply_timeout": 0.2, **REAL[kind]}
     device = create(settings, Bench(**bench))
     yield Bed(device, kind)
     device.close()
@@ -151,11 +164,12 @@ def test_closing_leaves_the_output_at_zero(bed):
     device.open()
     for _ in range(20):
         bed.tick(3.0)
-    if bed.kind == "serial":
+    if bed.kind in REAL:
         device.close()
         assert device.disarmed
         device.open()
-        assert device.info.state == DISARMED
+        state = device.info.state if bed.kind == "serial" else device.state
+        assert state in (DISARMED, State.DISABLED)
         assert device.output == 0.0
         drift = [bed.tick(0.0) for _ in range(100)]
         speeds = np.diff([s.position for s in drift]) / np.diff([s.time for s in drift])
