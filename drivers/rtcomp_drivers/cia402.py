@@ -36,7 +36,7 @@ _LISTEN_S = 0.1
 _PINGS = 5
 _FAULTS = (State.FAULT, State.FAULT_REACTION)
 _COUNTERS = (
-    "sent", "samples", "missed", "late", "clamped", "bad_frames", "other_frames", "warnings",
+    "sent", "samples", "missed", "late", "duplicate", "clamped", "bad_frames", "other_frames", "warnings",
 )  # fmt: skip
 
 

@@ -76,6 +76,8 @@ class Talk:
         self._damaged = 0
         self._origin = time.monotonic()
         self._counts: int | None = None
+        self._owed = 0
+        """SYNCs whose sample has not come."""
         self._statusword = 0
 
     def send(self, controlword: int, torque: int) -> None:
@@ -83,6 +85,7 @@ class Talk:
         _RPDO.pack_into(self._rpdo.data, 0, controlword, torque)
         self.link.send(self._rpdo)
         self.sequence += 1
+        self._owed = min(self._owed + 1, 2)  # a lost sample must not stand for a later duplicate for ever
         self._counters["sent"] += 1
         self.synced = time.monotonic()
         self.link.send(self._sync)
@@ -151,8 +154,11 @@ class Talk:
             self.state = state_of(self._statusword)
             says = "no state that CiA 402 knows" if self.state is None else self.state.value
             self._fail(f"is not enabled any more but in '{says}'")
-        if self.sequence <= self.answered:
-            self._counters["late"] += 1  # more samples than SYNCs: one came that had been taken for lost
+        if not self._owed:
+            self._counters["duplicate"] += 1  # nobody asked for it
+            return
+        self._owed -= 1
+        self._counters["late"] += self.answered == self.sequence  # one came that had been taken for lost
         if self._counts is None:
             self._counts = raw
         else:  # 32 bits of a position that goes on beyond them: the nearest that has these
@@ -168,11 +174,8 @@ class Talk:
             return
         self.heard_beat = time.monotonic()
         state = data[0] & 0x7F
-        if self.armed and state != _OPERATIONAL:
-            what = (
-                "was reset" if state == _BOOT_UP else f"is not operational any more (NMT state {state:02X}h)"
-            )
-            raise DeviceError(f"{self.who}: {what}; its output is zero")
+        if self._watching and state != _OPERATIONAL:
+            self._fail("was reset" if state == _BOOT_UP else f"is not operational (NMT state {state:02X}h)")
 
     def _warned(self, data: bytearray) -> None:
         if len(data) != 8:
@@ -193,7 +196,7 @@ class Talk:
     def _fail(self, what: str) -> NoReturn:
         """Keep and raise the error; asking the drive for the reason reads the bus again, which must not."""
         self.failure = DeviceError(f"{self.who}: {what}")
-        self.failure = DeviceError(f"{self.who}: {what}: {self.why()}; its output is zero")
+        self.failure = DeviceError(f"{self.who}: {what}: {self.why()}")
         raise self.failure
 
     def says_emergency(self) -> str:
