@@ -10,6 +10,7 @@ import select
 import socket
 import subprocess
 import time
+from collections import deque
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -26,6 +27,14 @@ _BUS_OFF = 0x40
 """Class of an error frame of the kernel's: the controller has left the bus."""
 _FULL = (errno.ENOBUFS, errno.EAGAIN, None)
 """Error codes of a send queue that takes no more; python-can gives none for its own time-out."""
+
+
+_MOST_ECHOES = 256
+_Content = tuple[int, bool, bytes]
+
+
+def _content(message: can.Message) -> _Content:
+    return message.arbitration_id, message.is_remote_frame, bytes(message.data)
 
 
 class CanSettings(DriverSettings):
@@ -95,6 +104,10 @@ class CanLink:
             self._descriptor = None
         self._watched = [] if self._descriptor is None else [self._descriptor]
         self._failures = (_can().CanError, OSError, ValueError)
+        # On python-can's multicast bus every node hears itself too; a master must not take that for another.
+        self._echoes: deque[_Content] | None = None
+        if settings.interface == "udp_multicast":
+            self._echoes = deque(maxlen=_MOST_ECHOES)
         self._is_open = True
 
     @property
@@ -117,18 +130,16 @@ class CanLink:
             while True:
                 message = self.bus.recv(0)
                 if message is not None:
-                    if not message.is_error_frame:
+                    if self._is_ours_to_have(message):
                         return message
-                    self._error_frame(message)
                     continue
                 left = end - time.monotonic()
                 if left <= 0.0:
                     return None
                 if self._descriptor is None:
                     message = self.bus.recv(left)
-                    if message is None or not message.is_error_frame:
+                    if message is None or self._is_ours_to_have(message):
                         return message
-                    self._error_frame(message)
                 elif not select.select(self._watched, [], [], left)[0]:
                     return None
         except self._failures as error:
@@ -136,6 +147,8 @@ class CanLink:
 
     def send(self, message: can.Message) -> None:
         """Send a frame now; raise DeviceError where it cannot leave: queue full, bus off, unplugged."""
+        if self._echoes is not None:
+            self._echoes.append(_content(message))
         try:
             self.bus.send(message)
         except self._failures as error:
@@ -173,6 +186,18 @@ class CanLink:
             if code in (errno.EBUSY, errno.EADDRINUSE):
                 raise DeviceBusyError(f"{self.who} is busy: another program uses it; end that one") from error
             raise DeviceError(f"{self.who} cannot be opened ({_one_line(error)})") from error
+
+    def _is_ours_to_have(self, message: can.Message) -> bool:
+        """Tell a frame of somebody else's from our own that comes back, and from an error frame."""
+        if message.is_error_frame:
+            self._error_frame(message)
+            return False
+        if self._echoes:
+            content = _content(message)
+            if content in self._echoes:
+                self._echoes.remove(content)
+                return False
+        return True
 
     def _error_frame(self, message: can.Message) -> None:
         self.error_frames += 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from rtcomp.errors import ConfigError, nearest
@@ -40,8 +41,11 @@ class DeviceSide(Protocol):
         """Return what happened: counters, and each time at which the output went to zero."""
 
 
-def build(link: str, plant: Plant, stage: Stage) -> DeviceSide:
-    """Build the device's side of `link`; raise ConfigError where there is none."""
+def build(link: str, plant: Plant, stage: Stage, watchdog: float | None = None) -> DeviceSide:
+    """Build the device's side of `link`; raise ConfigError where there is none.
+
+    `watchdog` (s) is for drives on which it is set beforehand; a board's is set by the host that arms it.
+    """
     if link not in LINKS:
         raise ConfigError(f"plant server: unknown link {link!r}; {nearest(link, LINKS)}")
     module, _, function = LINKS[link].partition(":")
@@ -51,4 +55,8 @@ def build(link: str, plant: Plant, stage: Stage) -> DeviceSide:
         if error.name != module:
             raise
         raise ConfigError(f"plant server: this version does not serve the link {link!r}") from None
-    return cast(DeviceSide, builder(plant, stage))
+    if watchdog is None:
+        return cast(DeviceSide, builder(plant, stage))
+    if "watchdog" not in inspect.signature(builder).parameters:
+        raise ConfigError(f"plant server: on the link {link!r} the host sets the watchdog, not the device")
+    return cast(DeviceSide, builder(plant, stage, watchdog=watchdog))

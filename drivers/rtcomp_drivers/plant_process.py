@@ -20,10 +20,10 @@ from rtcomp.errors import DeviceError, DeviceTimeoutError
 class PlantProcess:
     """A running plant server; a context manager that ends it. It also ends by itself when this process dies.
 
-    `link` is what it speaks (rtcomp_drivers.plant_links). With `firmware`, a program made by
-    drivers/firmware, that is the board. Starting takes up to a minute the first time, when the simulation is
-    compiled. Raises DeviceError where the server ends instead of serving, with what it said, and
-    DeviceTimeoutError where it says nothing.
+    `link` is what it speaks (rtcomp_drivers.plant_links), `watchdog` (s) that of a drive which has its own.
+    With `firmware`, a program made by drivers/firmware, that is the board. Starting takes up to a minute the
+    first time, when the simulation is compiled. Raises DeviceError where the server ends instead of serving,
+    with what it said, and DeviceTimeoutError where it says nothing.
     """
 
     def __init__(
@@ -35,12 +35,15 @@ class PlantProcess:
         patience: float = 120.0,
         firmware: str | Path | None = None,
         link: str = "serial",
+        watchdog: float | None = None,
     ) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="rtcomp-plant-")
         self._log = Path(self._folder.name, "summary.json")
         self._errors = Path(self._folder.name, "errors.txt")
         command = [sys.executable, "-m", "rtcomp_drivers.plant_server", "--config", str(config)]
         command += ["--link", link, "--until-eof", "--json", "--seed", str(seed), "--log", str(self._log)]
+        if watchdog is not None:
+            command += ["--watchdog", str(watchdog)]
         if firmware is not None:
             command += ["--firmware", str(firmware)]
         if not realtime:

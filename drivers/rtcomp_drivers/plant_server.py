@@ -70,8 +70,10 @@ class PlantServer:
     Raises ConfigError for a link that it does not speak, DeviceError where no port is to be had.
     """
 
-    def __init__(self, stage: Stage, seed: int = 0, link: str = "serial") -> None:
-        self.side = build(link, warm(stage, seed), stage)
+    def __init__(
+        self, stage: Stage, seed: int = 0, link: str = "serial", watchdog: float | None = None
+    ) -> None:
+        self.side = build(link, warm(stage, seed), stage, watchdog)
         self.keeping = Keeping()
         self.unsent = 0
         """Bytes that no host read."""
@@ -179,9 +181,11 @@ def serve(
     realtime: bool = True,
     until_eof: bool = False,
     firmware: Path | None = None,
+    watchdog: float | None = None,
 ) -> dict[str, Any]:
     """Run `stage` behind a port until SIGINT or SIGTERM; return the summary that is also written.
 
+    `watchdog` (s) is that of a drive on which it is set beforehand (CAN).
     With `firmware`, the program that drivers/firmware makes for this machine, the board is that program in a
     process of its own, and this one is only what hangs on it.
 
@@ -193,7 +197,7 @@ def serve(
     """
     server: PlantServer | FirmwareServer
     if firmware is None:
-        server = PlantServer(stage, seed=seed, link=link)
+        server = PlantServer(stage, seed=seed, link=link, watchdog=watchdog)
     elif link == "serial":
         server = FirmwareServer(stage, firmware, seed=seed)
     else:
@@ -275,6 +279,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--until-eof", action="store_true", help="end at the end of standard input too: with who started it"
     )
+    parser.add_argument(
+        "--watchdog", type=float, help="s, of a drive that has its own (CAN); on serial the host sets it"
+    )
     options = parser.parse_args(arguments)
     try:
         serve(
@@ -286,6 +293,7 @@ def main(arguments: list[str] | None = None) -> int:
             realtime=not options.no_realtime,
             until_eof=options.until_eof,
             firmware=options.firmware,
+            watchdog=options.watchdog,
         )
     except RtcompError as error:
         print(f"error: {error}", file=sys.stderr)

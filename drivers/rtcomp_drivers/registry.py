@@ -90,7 +90,14 @@ def create(
         driver = find(name)
     except ConfigError as error:
         raise file.error((section, "driver"), str(error).removeprefix("device: ")) from error
-    return driver(validate(driver.Settings, file, (section,)), bench)
+    checked = validate(driver.Settings, file, (section,))
+    try:
+        return driver(checked, bench)
+    except ConfigError as error:
+        if not error.key:
+            raise
+        says = str(error).removeprefix("device: ").removeprefix(f"{error.key[-1]} ")
+        raise file.error((section, *error.key), says) from error
 
 
 def describe() -> list[Description]:

@@ -22,6 +22,12 @@ _EVERYTHING = (b"M00000000", b"mFFFFFFFF")
 """Acceptance code and mask that let every frame pass; others are refused, for this adapter filters none."""
 
 
+_COMMANDS = frozenset(
+    (*BIT_RATES, *_EVERYTHING, b"O", b"L", b"C", b"V", b"N", b"F", b"Z0", b"Z1", b"X0", b"X1")
+)
+"""Lines that mean something, if not in every state."""
+
+
 class SlcanAdapter:
     """The adapter. `bit_rate` is the bus's; opened at another one it hears nothing and nobody hears it."""
 
@@ -32,8 +38,9 @@ class SlcanAdapter:
         """Opened to listen only."""
         self.chosen: int | None = None
         """bit/s that the host chose; None before it did."""
-        self.counters = dict.fromkeys(("frames", "refused", "unheard"), 0)
-        """Frames taken from the host, lines refused, frames lost to a closed channel or a wrong bit rate."""
+        self.counters = dict.fromkeys(("frames", "damaged", "unheard"), 0)
+        """Frames taken from the host, lines that were nothing, frames lost to a closed channel or another bit
+        rate."""
         self._line = bytearray()
         self._too_long = False
 
@@ -44,9 +51,10 @@ class SlcanAdapter:
         *ended, rest = data.split(b"\r")
         for piece in ended:
             self._collect(piece)
-            answers.append(BELL if self._too_long else self._obey(bytes(self._line), frames))
-            if answers[-1] == BELL:
-                self.counters["refused"] += 1
+            line = bytes(self._line)
+            answers.append(BELL if self._too_long else self._obey(line, frames))
+            if answers[-1] == BELL and (self._too_long or line not in _COMMANDS):
+                self.counters["damaged"] += 1
             self._line.clear()
             self._too_long = False
         self._collect(rest)

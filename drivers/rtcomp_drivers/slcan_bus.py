@@ -7,6 +7,7 @@ as long as the other side does not read. Here both go by the raw descriptor.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import select
@@ -95,6 +96,13 @@ class SlcanBus(slcanBus):
                 data=frame.data,
             )
             self._received.append(message)
+
+    def shutdown(self) -> None:
+        """Close the channel and the port, also where the adapter has gone; again does nothing."""
+        with contextlib.suppress(can.CanError, OSError, AttributeError):  # the last: it was never opened
+            super().shutdown()
+        with contextlib.suppress(OSError, AttributeError):
+            self.serialPortOrig.close()
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Send a classic frame now, or raise CanOperationError (ENOBUFS where the line takes no more)."""

@@ -60,7 +60,7 @@ class SlcanSide:
         counters = self.adapter.counters
         return {
             "frames": counters["frames"],
-            "bad_frames": counters["refused"],
+            "bad_frames": counters["damaged"],
             "unheard_frames": counters["unheard"],
             **self.axis.summary(),
         }

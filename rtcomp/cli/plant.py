@@ -7,14 +7,17 @@ from pathlib import Path
 import click
 from rtcomp_drivers.plant_links import LINKS
 
+from rtcomp.cli.options import Within
+
 
 @click.group()
 def plant() -> None:
     """Stand in for hardware: a simulated stage in its own process, in real time, behind a port.
 
     \b
-    Example:
+    Examples:
       rtcomp plant serve --config configs/leuven.yaml --serial
+      rtcomp plant serve --config configs/leuven.yaml --link odrive-can
     """
 
 
@@ -34,11 +37,25 @@ def plant() -> None:
 @click.option(
     "--firmware", type=click.Path(path_type=Path), help="The board's program, made by `make firmware`."
 )
-def serve(config: Path, link: str, seed: int, as_json: bool, log: Path | None, firmware: Path | None) -> None:
+@click.option(
+    "--watchdog",
+    type=Within(0.001, 10.0),
+    metavar="S",
+    help="Of a drive that has its own (CAN); on serial the host sets it.",
+)
+def serve(
+    config: Path,
+    link: str,
+    seed: int,
+    as_json: bool,
+    log: Path | None,
+    firmware: Path | None,
+    watchdog: float | None,
+) -> None:
     """Serve the stage in CONFIG behind a pty and print the port to use; ends with Ctrl-C.
 
-    It has the watchdog that a board has: without commands for the time set at arming, its output goes to
-    zero and it has to be armed anew.
+    It has the watchdog that a board or drive has: without commands for the time set, its output goes to zero
+    and it has to be armed anew.
 
     \b
     Examples:
@@ -49,4 +66,7 @@ def serve(config: Path, link: str, seed: int, as_json: bool, log: Path | None, f
 
     from rtcomp.stage.stage import Stage
 
-    run(Stage.load(config), link=link, seed=seed, as_json=as_json, log=log, firmware=firmware)
+    run(
+        Stage.load(config), link=link, seed=seed, as_json=as_json, log=log, firmware=firmware,
+        watchdog=watchdog,
+    )  # fmt: skip

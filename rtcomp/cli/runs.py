@@ -20,7 +20,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 def device_options(function: F) -> F:
     """Add ``--port`` (argument `port`) and ``--clock`` (argument `clock`)."""
     port = click.option(
-        "--port", metavar="PORT", help="Serial port of a board or plant server, instead of the file's device."
+        "--port",
+        metavar="PORT",
+        help="Port of a board, CAN interface or plant server, instead of the file's device's.",
     )
     clock = click.option(
         "--clock", type=click.Choice(["virtual", "wall"]), help="Run as fast as possible, or in real time."
@@ -36,13 +38,26 @@ def load(
 
     config = Configuration.load(path)
     if port is not None:
-        device = config.run.device if config.run.device.get("driver") == "serial" else {}
-        config = config.changed(device={**device, "driver": "serial", "port": port})
+        config = config.changed(device=_at(port, config.run.device))
     if clock is not None:
         config = config.changed(clock=clock)
     if seconds is not None:
         config = lasting(config, seconds)
     return config
+
+
+def _at(port: str, device: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the section `device` with another port; where it has no driver with one, that of a board.
+
+    A driver on a CAN bus gets it as its channel; a path is an slcan adapter's.
+    """
+    from rtcomp_drivers.registry import find, names
+
+    driver = device.get("driver")
+    keys = find(driver).Settings.model_fields if driver in names() else {}
+    if "channel" in keys:
+        return {**device, "channel": port, **({"interface": "slcan"} if "/" in port else {})}
+    return {**device, "port": port} if "port" in keys else {"driver": "serial", "port": port}
 
 
 def lasting(config: Configuration, seconds: float) -> Configuration:

@@ -130,8 +130,8 @@ def test_an_example_runs_as_it_stands(folder: Path, example: str) -> None:
             assert run.stdout.strip()
 
 
-def test_the_plants_example_serves(folder: Path) -> None:
-    (example,) = helped("plant", "serve")
+@pytest.mark.parametrize("example", helped("plant", "serve"))
+def test_the_plants_example_serves(folder: Path, example: str) -> None:
     process = subprocess.Popen(
         [RTCOMP, *shlex.split(example)[1:]], cwd=folder, env=environment(), text=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,

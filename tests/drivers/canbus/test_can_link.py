@@ -261,6 +261,9 @@ def test_python_can_s_own_multicast_bus():
         pytest.skip(f"no multicast here: {error}")
     one.send(message(data=b"\x05"))
     assert other.receive(2.0).data == b"\x05"
+    assert one.receive(0.1) is None, "its own frame came back"
+    other.send(message(data=b"\x05"))
+    assert one.receive(2.0).data == b"\x05"
     one.close()
     other.close()
 

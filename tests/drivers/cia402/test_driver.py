@@ -329,7 +329,7 @@ def test_damaged_frames_are_dropped_and_many_are_the_end(driver, drive):
         ({"bitrate": 250_000}, ["250000 bit/s", "500000"]),
         ({"bitrate": 1_000_000, "period": 2e-4}, ["5000 Hz"]),
         ({"watchdog": 0.005, "period": 2e-3}, ["watchdog", "three periods (0.006 s)"]),
-        ({"host_node": 5}, ["host_node is 5"]),
+        ({"host_node": 5}, ["host_node: is 5"]),
         ({"interface": "socketcam"}, ["socketcam", "socketcan"]),
         ({"eds": "no/such.eds"}, ["no/such.eds does not exist"]),
         ({"node": 0}, ["node"]),

@@ -1,0 +1,154 @@
+"""A stage behind an ODrive on a CAN bus, in a process of its own: no host outlives its watchdog."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from rtcomp_drivers.driver import Bench
+from rtcomp_drivers.plant_process import PlantProcess
+from rtcomp_drivers.registry import create
+
+from rtcomp.errors import ConfigError, DeviceError
+from rtcomp.loop.device import OK
+
+WATCHDOG_S = 0.1
+"""The plant server's axis has this one."""
+SLACK_S = 0.25
+"""For processes that wait for a processor on a busy machine; the axis' own clock knows none."""
+LEAD = 1e-3
+HOST = """
+import sys, time
+from pathlib import Path
+from rtcomp_drivers.driver import Bench
+from rtcomp_drivers.registry import create
+from rtcomp.stage.stage import Stage
+settings = {"driver": "odrive-can", "interface": "slcan", "channel": sys.argv[1], "lead": 1e-3,
+            "reply_timeout": 0.05, "max_missed": 100000, "clear_fault": True}
+device = create(settings, Bench(stage=Stage.load(Path(sys.argv[2])), period=1e-3))
+device.open()
+try:
+    for k in range(1000000):
+        device.exchange(1.0)
+        if k == 50:
+            print("running", flush=True)
+        time.sleep(1e-3)
+finally:
+    device.close()
+"""
+
+
+@pytest.fixture
+def plant(stage_file):
+    with PlantProcess(stage_file, link="odrive-can") as process:
+        yield process
+
+
+def connect(plant, stage, **settings):
+    settings = {"interface": "slcan", "channel": plant.port, "lead": LEAD, "reply_timeout": 0.1, **settings}
+    return create({"driver": "odrive-can", **settings}, Bench(stage=stage, period=1e-3))
+
+
+def start_host(plant, stage_file):
+    process = subprocess.Popen(
+        [sys.executable, "-c", HOST, plant.port, str(stage_file)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    line = process.stdout.readline()
+    assert line == b"running\n", process.stderr.read().decode()
+    return process
+
+
+def test_it_is_the_stage_of_the_file(stage_file, stage):
+    """Pushed by a small constant force, it swings about the place where the stage's own friction holds it."""
+    volts = 0.04
+    plant = PlantProcess(stage_file, link="odrive-can", watchdog=0.5)
+    with plant, connect(plant, stage, watchdog=0.5) as device:
+        positions = []
+        for _ in range(500):
+            sample = device.exchange(volts)
+            if sample.status == OK:
+                positions.append(sample.position)
+            time.sleep(1e-3)
+    held_at = volts * stage.force_constant / sum(e.stiffness for e in stage.file.stage.friction)
+    assert max(positions) > 1.5 * held_at
+    assert sum(positions) / len(positions) == pytest.approx(held_at, rel=0.1)
+    summary = plant.stop()
+    assert summary["bad_frames"] == summary["clamped"] == summary["ignored"] == summary["unknown"] == 0
+    assert [z["cause"] for z in summary["zeroings"]] == ["watchdog", "disarmed"]  # proven, then closed
+    assert summary["state"] == "IDLE"
+
+
+@pytest.mark.parametrize("moments", [3, pytest.param(100, marks=pytest.mark.slow)])
+def test_killed_or_stopped_at_any_moment_the_host_leaves_a_zero_output(stage_file, stage, moments):
+    noise = random.Random(11)
+    with PlantProcess(stage_file, link="odrive-can") as plant:
+        gone = []
+        for k in range(moments):
+            number = signal.SIGSTOP if k % 2 else signal.SIGKILL
+            host = start_host(plant, stage_file)
+            time.sleep(0.2 * noise.random())
+            host.send_signal(number)
+            gone.append(time.monotonic())
+            time.sleep(WATCHDOG_S + SLACK_S)
+            host.kill()
+            host.communicate()
+        with connect(plant, stage, clear_fault=True) as device:
+            assert any("WATCHDOG_TIMER_EXPIRED" in r for r in device.remarks)
+            first = device.exchange(0.0)
+            assert first.status == OK
+        summary = plant.stop()
+    # Each host proves the watchdog when it opens; ours did too, and ended in order.
+    zeroings = summary["zeroings"]
+    assert [z["cause"] for z in zeroings] == ["watchdog"] * (2 * moments + 1) + ["disarmed"]
+    for z, moment in zip(zeroings[1 : 2 * moments : 2], gone, strict=True):
+        assert z["since_command"] == pytest.approx(WATCHDOG_S, abs=1e-6)
+        assert z["noticed_after"] < SLACK_S
+        assert summary["started_monotonic_s"] + z["time"] - moment < WATCHDOG_S + SLACK_S
+
+
+def test_a_host_that_goes_on_after_its_watchdog_gets_no_say(plant, stage_file):
+    host = start_host(plant, stage_file)
+    host.send_signal(signal.SIGSTOP)
+    time.sleep(WATCHDOG_S + SLACK_S)
+    host.send_signal(signal.SIGCONT)
+    _, errors = host.communicate(timeout=20)
+    assert host.returncode != 0
+    assert b"WATCHDOG_TIMER_EXPIRED" in errors
+    assert [z["cause"] for z in plant.stop()["zeroings"]] == ["watchdog", "watchdog"]
+
+
+def test_a_host_that_is_interrupted_leaves_in_order(plant, stage_file):
+    host = start_host(plant, stage_file)
+    host.send_signal(signal.SIGINT)
+    host.communicate(timeout=20)
+    assert [z["cause"] for z in plant.stop()["zeroings"]] == ["watchdog", "disarmed"]
+
+
+def test_a_plant_that_dies_ends_the_host_by_an_error(plant, stage):
+    with connect(plant, stage) as device:
+        device.exchange(0.5)
+        os.kill(plant.pid, signal.SIGKILL)
+        with pytest.raises(DeviceError):
+            for _ in range(200):
+                device.exchange(0.5)
+    assert device.disarmed is False
+
+
+def test_links_that_there_are_not(stage_file, stage):
+    from rtcomp_drivers.plant_links import build
+
+    with pytest.raises(ConfigError, match=r"'odrive'.*did you mean 'odrive-can'"):
+        build("odrive", None, stage)
+    with pytest.raises(DeviceError, match="invalid choice"):
+        PlantProcess(stage_file, link="odrive")
+    with pytest.raises(DeviceError, match="'serial' the host sets the watchdog"):
+        PlantProcess(stage_file, watchdog=0.5)
+    with pytest.raises(DeviceError, match=r"firmware.*'serial'"):
+        PlantProcess(stage_file, link="odrive-can", firmware="/bin/true")
