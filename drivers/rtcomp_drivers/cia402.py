@@ -27,6 +27,7 @@ from rtcomp_drivers.cia402_states import (
 from rtcomp_drivers.driver import Bench, Driver, check_volts
 
 if TYPE_CHECKING:
+    from rtcomp_drivers.cia402_fit import Fit
     from rtcomp_drivers.cia402_setup import Drive
     from rtcomp_drivers.cia402_talk import Talk
 
@@ -80,6 +81,7 @@ class Cia402Driver(Driver):
         self._limit = 0
         self._missed = 0
         self._taken = False
+        self._fit: Fit | None = None
 
     @property
     def state(self) -> State | None:
@@ -226,7 +228,7 @@ class Cia402Driver(Driver):
             )
         self._taken = True
         drive.command(_PRE_OPERATIONAL)
-        found = fit(drive, settings, self.bench)
+        found = self._fit = fit(drive, settings, self.bench)
         configure(drive, settings, self.bench, found)
         self._per_mille, self._limit, talk.count_size = found.per_mille, found.limit, found.count_size
         drive.command(_START)
@@ -315,17 +317,17 @@ class Cia402Driver(Driver):
         return True
 
     def _give_back(self, talk: Talk) -> None:
-        """Leave the drive pre-operational, watching over nobody, and let go of the bus. Raises nothing."""
+        """Leave the drive pre-operational, as it was before, and let go of the bus. Raises nothing."""
+        from rtcomp_drivers.cia402_fit import give_back
+
         drive, self._drive = self._drive, None
         try:
-            if self._taken and drive is not None:
-                self._taken = False
+            if self._taken and drive is not None and self._fit is not None:
                 with contextlib.suppress(DeviceError):  # first: without it there are no PDOs
                     drive.command(_PRE_OPERATIONAL)
-                if self.settings.drive_watchdog:
-                    drive.write(0x1016, 1, 0)  # else it would find our heartbeat lost, and be in fault
-                drive.write(0x1017, 0, 0)
+                give_back(drive, self.settings, self._fit)
         except DeviceError as error:
-            self.remarks.append(f"{error}; its heartbeat settings stay as they are")
+            self.remarks.append(f"{error}; its heartbeats and largest torque stay as they are")
         finally:
+            self._taken = False
             talk.link.close()

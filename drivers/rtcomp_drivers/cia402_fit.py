@@ -33,6 +33,8 @@ class Fit:
     count_size: float = 1.0
     """m (rad) per count of 6064h."""
     mode: int = CYCLIC_TORQUE
+    before: dict[int, int] = field(default_factory=dict)
+    """Objects that are changed for the run, with what was in them."""
     remarks: list[str] = field(default_factory=list)
 
 
@@ -72,14 +74,18 @@ def fit(drive: Drive, settings: Cia402Settings, bench: Bench) -> Fit:
         volts = stage.voltage_limit
     found.limit = _MOST if volts is None else min(_MOST, max(1, math.ceil(volts * found.per_mille - 1e-6)))
     if drive.has(0x6072):
-        its_own = drive.read(0x6072)
+        its_own = found.before[0x6072] = drive.read(0x6072)
+        if its_own == 0:
+            raise DeviceError(
+                f"{drive.who}: its largest torque (6072h) is 0; set it, or switch the drive off and on"
+            )
         if its_own < found.limit and volts is not None:
             found.remarks.append(
                 f"{drive.who}: its largest torque (6072h) is {its_own / found.per_mille:.3g} V; the run's "
                 f"voltage limit of {volts:g} V is not reached"
             )
         found.limit = min(found.limit, its_own)
-    if found.per_mille < 10.0 and volts is not None and found.limit < 100:
+    if found.limit < 100:
         found.remarks.append(
             f"{drive.who}: one step of 6071h is {1.0 / found.per_mille:.3g} V, the limit {found.limit} of "
             "them; a motor of lower rated torque would be finer"
@@ -89,6 +95,7 @@ def fit(drive: Drive, settings: Cia402Settings, bench: Bench) -> Fit:
 
 def configure(drive: Drive, settings: Cia402Settings, bench: Bench, found: Fit) -> None:
     """Set limits, mode, watchdog and PDOs; raise where the drive does not take what safety needs."""
+    found.before[0x1017] = drive.read(0x1017)
     drive.write(0x1017, 0, settings.heartbeat_ms)
     if settings.drive_watchdog:
         value = settings.host_node << 16 | round(1e3 * settings.watchdog)
@@ -119,6 +126,14 @@ def configure(drive: Drive, settings: Cia402Settings, bench: Bench, found: Fit) 
     turned_off = drive.map_pdos([0x6041, 0x6064], [0x6040, 0x6071])
     if turned_off:
         found.remarks.append(f"{drive.who}: {turned_off} other PDOs were turned off until it is reset")
+
+
+def give_back(drive: Drive, settings: Cia402Settings, found: Fit) -> None:
+    """Undo what would outlive the run; raises as `Drive.write` does."""
+    if settings.drive_watchdog:
+        drive.write(0x1016, 1, 0)  # else it would find our heartbeat lost, and be in fault
+    for index, value in found.before.items():
+        drive.write(index, 0, value)
 
 
 def _mode(drive: Drive, settings: Cia402Settings) -> int:

@@ -5,9 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("canopen", reason="the extra 'can' is not installed")
-
 from drives_on_a_bus import AxisOnBus, LocalDrive
 from rtcomp_drivers.driver import Bench
 from rtcomp_drivers.registry import create
@@ -26,18 +23,18 @@ def e35():
 @pytest.fixture
 def made():
     """Calls that build drives and drivers; all end with the test, drivers first."""
-    return_all = []
+    everything = []
 
     class Made:
         @staticmethod
         def axis(**facts):
-            return_all.append(AxisOnBus(**facts))
-            return return_all[-1]
+            everything.append(AxisOnBus(**facts))
+            return everything[-1]
 
         @staticmethod
         def local(eds, **more):
-            return_all.append(LocalDrive(eds, **more))
-            return return_all[-1]
+            everything.append(LocalDrive(eds, **more))
+            return everything[-1]
 
         @staticmethod
         def driver(drive, bench=None, **settings):
@@ -47,9 +44,9 @@ def made():
             }  # fmt: skip
             driver = create(settings, bench or Bench(period=1e-3))
             driver.end = driver.close
-            return_all.append(driver)
+            everything.append(driver)
             return driver
 
     yield Made
-    for thing in reversed(return_all):
+    for thing in reversed(everything):
         thing.end()

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import struct
 import time
 
 import can
 import numpy as np
 import pytest
+from canopen.sdo import SdoClient
+from hypothesis import given
+from hypothesis import settings as settings_of_hypothesis
+from hypothesis import strategies as st
+from rtcomp_drivers import cia402
 from rtcomp_drivers.cia402_axis import State
 from rtcomp_drivers.cia402_objects import EDS, eds_text
 from rtcomp_drivers.cia402_settings import Cia402Settings
@@ -96,6 +102,12 @@ def test_commands_are_rounded_and_clamped(made, drive):
         assert driver.counters["clamped"] == 2
         driver.exchange(0.0)
         wait(lambda: drive.axis.memory[0x6072] == 2000)  # the drive clamps there too
+    assert drive.axis.memory[0x6072] == 10_000  # the next run may have another limit
+
+
+def test_a_drive_whose_largest_torque_is_nothing(driver, drive):
+    drive.axis.memory[0x6072] = 0
+    refused(DeviceError, ["6072h", "is 0"], driver.open)
 
 
 def test_it_closes_so_that_the_drive_misses_nobody(driver, drive):
@@ -381,6 +393,64 @@ def test_files_that_are_no_eds(tmp_path, content):
     other = tmp_path / "drive.txt"
     other.write_text(EDS.read_text())
     refused(ConfigError, ["no EDS file"], in_vain(eds=str(other)))
+
+
+class Babbling:
+    """A link to something that answers every SDO request with whatever it likes."""
+
+    who, damaged, latency_timer_ms = "CAN interface of a test", 0, None
+
+    def __init__(self, answers):
+        self._answers = iter(answers)
+        self._next = None
+
+    def send(self, message):
+        if message.arbitration_id == 0x605:
+            self._next = next(self._answers, None)
+
+    def receive(self, seconds):
+        data, self._next = self._next, None
+        if data is None:
+            time.sleep(min(seconds, 1e-3))
+            return None
+        return can.Message(arbitration_id=0x585, data=data, is_extended_id=False)
+
+    def close(self):
+        pass
+
+
+def plausible(head, index, sub, value):
+    return struct.pack("<BHBI", head, index, sub, value)
+
+
+@settings_of_hypothesis(max_examples=150, deadline=None)
+@given(
+    answers=st.lists(
+        st.one_of(
+            st.binary(min_size=8, max_size=8),
+            st.binary(max_size=8),
+            st.builds(
+                plausible,
+                st.sampled_from([0x40, 0x41, 0x42, 0x43, 0x47, 0x4B, 0x4F, 0x60, 0x80, 0x00, 0x01, 0x10]),
+                st.sampled_from([0x1000, 0x6041, 0x1008, 0x60A8, 0x6502]),
+                st.sampled_from([0, 1]),
+                st.sampled_from([402, 0x50, 0x00020192, 5, 1 << 31, 0x06020000]),
+            ),
+        ),
+        max_size=12,
+    )
+)
+def test_whatever_answers_sdo_is_refused_in_one_line(answers):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            cia402, "CanLink", lambda settings: Babbling([plausible(0x43, 0x1000, 0, 402), *answers])
+        )
+        patch.setattr(cia402, "_LISTEN_S", 0.0)
+        patch.setattr(SdoClient, "RESPONSE_TIMEOUT", 0.003)
+        device = in_vain()()
+        with pytest.raises(RtcompError) as caught:
+            device.open()
+        assert "\n" not in str(caught.value)
 
 
 class Quiet:
