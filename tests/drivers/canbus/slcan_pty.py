@@ -20,18 +20,23 @@ class Adapter:
         self.adapter = SlcanAdapter(bit_rate)
         self.master, self._slave = os.openpty()
         tty.setraw(self._slave)
+        os.set_blocking(self.master, False)  # what no host reads is lost, as on a bus
         self.port = os.ttyname(self._slave)
         self.heard = []
+        self.reads = True
         self._ended = False
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def _run(self):
         while not self._ended:
-            if select.select([self.master], [], [], 0.01)[0]:
+            if not self.reads:
+                time.sleep(0.01)
+            elif select.select([self.master], [], [], 0.01)[0]:
                 answer, frames = self.adapter.receive(os.read(self.master, 4096))
                 self.heard += frames
-                os.write(self.master, answer + b"".join(map(self.adapter.send, frames)))
+                with contextlib.suppress(BlockingIOError):
+                    os.write(self.master, answer + b"".join(map(self.adapter.send, frames)))
 
     def end(self):
         if not self._ended:
@@ -53,6 +58,7 @@ class PtyAxis:
         self.to_axis = self.to_host = lambda frames: frames
         self.master, self._slave = os.openpty()
         tty.setraw(self._slave)
+        os.set_blocking(self.master, False)  # what no host reads is lost, as on a bus
         self.port = os.ttyname(self._slave)
         self._injected = []
         self._ended = False

@@ -124,15 +124,23 @@ def test_an_unplugged_adapter_is_an_error_and_closing_it_is_not(adapter):
 
 def test_an_adapter_that_does_not_read_blocks_nobody(adapter):
     made = link(channel=adapter.port)
-    adapter._ended = True
-    adapter._thread.join()
+    adapter.reads = False
     began = time.monotonic()
     with pytest.raises(DeviceError, match=r"queue is full.*bit rate"):
-        for _ in range(100_000):
-            made.send(message(data=bytes(8)))
-    made.close()
+        for k in range(100_000):
+            made.send(message(data=k.to_bytes(4, "big")))
     assert time.monotonic() - began < 10.0
-    adapter._ended = False
+    adapter.reads = True
+    time.sleep(0.2)
+    made.send(message(data=b"after"))  # what was cut in the middle spoils nothing that follows
+    end = time.monotonic() + 5.0
+    while not (adapter.heard and adapter.heard[-1].data == b"after") and time.monotonic() < end:
+        time.sleep(0.01)
+    numbers = [int.from_bytes(f.data, "big") for f in adapter.heard[:-1]]
+    assert numbers == list(range(len(numbers)))
+    assert adapter.heard[-1].data == b"after"
+    assert adapter.adapter.counters["damaged"] <= 1
+    made.close()
 
 
 def test_a_port_that_is_used_already(adapter):

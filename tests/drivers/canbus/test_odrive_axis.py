@@ -151,6 +151,15 @@ def test_torque_is_clamped_and_cut_frames_are_ignored():
     assert axis.counters["clamped"] == 1
 
 
+def test_out_of_torque_control_it_puts_out_nothing():
+    axis = closed()
+    axis.receive([torque(0.5)], 0.01)
+    axis.receive([frame(Command.CONTROLLER_MODE, c.encode_mode(3, c.PASSTHROUGH))], 0.02)
+    assert axis.torque == 0.0
+    axis.receive([MODE], 0.03)
+    assert axis.torque == 0.5
+
+
 def test_states_that_it_does_not_have_are_refused():
     for state in (0, 2, 3, 4, 6, 7, 99):
         new, old = make(), make("0.5.6")

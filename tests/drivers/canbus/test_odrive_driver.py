@@ -61,6 +61,14 @@ def command(what, data=b"", node=0):
     return Frame(c.identifier(node, what), data)
 
 
+def comes(true, seconds=2.0):
+    """Wait until something is true: a command leaves after the request whose answer was waited for."""
+    end = time.monotonic() + seconds
+    while not true() and time.monotonic() < end:
+        time.sleep(2e-3)
+    return true()
+
+
 @pytest.fixture
 def axis(pty_axis):
     return pty_axis(watchdog=WATCHDOG)
@@ -128,7 +136,7 @@ def test_firmware_that_is_another(pty_axis):
         assert device.version is None
         for _ in range(5):
             assert device.exchange(0.1).status == OK
-        assert old.axis.torque == pytest.approx(0.1)
+        assert comes(lambda: old.axis.torque == pytest.approx(0.1))
     assert device.disarmed is True
 
 
@@ -153,7 +161,7 @@ def test_an_axis_that_somebody_else_has(axis):
             axis.to_axis([])
             axis.axis._fed = axis.axis.time
 
-    thread = threading.Thread(target=master)
+    thread = threading.Thread(target=master, daemon=True)
     thread.start()
     refused(DeviceBusyError, axis.port, "CLOSED_LOOP_CONTROL", "another master")
     feeding.set()
@@ -177,7 +185,7 @@ def test_a_second_master_is_noticed_before_and_while_running(axis, frame):
         while not stop.wait(0.02):
             axis.inject(frame)
 
-    thread = threading.Thread(target=speak)
+    thread = threading.Thread(target=speak, daemon=True)
     thread.start()
     refused(DeviceBusyError, axis.port, "only one master")
     stop.set()
@@ -266,8 +274,7 @@ def test_until_the_first_exchange_nothing_is_armed_and_arming_moves_nothing(axis
     with odrive(axis.port) as device:
         assert axis.axis.state == IDLE
         device.arm()
-        time.sleep(0.1)
-        assert axis.axis.state == CLOSED_LOOP
+        assert comes(lambda: axis.axis.state == CLOSED_LOOP)
         assert axis.axis.torque == 0.0
         assert axis.axis.plant.position == 0.0
     assert axis.axis.state == IDLE
@@ -281,8 +288,7 @@ def test_torque_position_and_their_units(axis):
         for volts in (0.5, -1.25, 2.0, 0.0):
             device.exchange(volts)
             outputs.append(device.output)
-            time.sleep(0.01)
-            assert axis.axis.torque == pytest.approx(0.25 * volts)
+            assert comes(lambda v=volts: axis.axis.torque == pytest.approx(0.25 * v))
         assert outputs == [0.0, 0.5, -1.25, 2.0]
         axis.axis.plant.position = 2.0 * math.pi * 3.0  # three turns of the motor
         axis.axis.plant.velocity = 0.0
@@ -300,21 +306,20 @@ def test_limits_go_where_they_belong(axis, stage):
         assert axis.axis.limits == (20.0, 8.0)
     with odrive(axis.port, torque_limit=0.1) as device:
         device.exchange(-5.0)
-        time.sleep(0.01)
-        assert axis.axis.torque == pytest.approx(-0.1)
+        assert comes(lambda: axis.axis.torque == pytest.approx(-0.1))
 
 
 @pytest.mark.parametrize("volts", [math.nan, math.inf, -math.inf, 1e9])
 def test_a_command_that_is_no_torque_is_not_sent(axis, volts):
     with odrive(axis.port) as device:
         device.exchange(0.1)
-        time.sleep(0.05)  # its torque leaves after the request that it waited for
-        before = axis.axis.counters["commands"]
         with pytest.raises(LimitError):
             device.exchange(volts)
-        device.exchange(0.1)
+        device.exchange(0.2)
+        assert comes(lambda: axis.axis.counters["commands"] == 3)
         time.sleep(0.05)
-        assert axis.axis.counters["commands"] == before + 1
+        assert axis.axis.counters["commands"] == 3  # the zero of arming, and two
+        assert axis.axis.torque == pytest.approx(0.2)
 
 
 def test_a_missing_reply_is_the_last_one_again_and_too_many_are_an_error(axis):

