@@ -55,8 +55,8 @@ class Cia402Settings(CanSettings):
     clear_fault: bool = Field(False, description="reset, when opening, a fault of the drive")
 
     def beat_every(self, period: float) -> int:
-        """Return after how many ticks of `period` s a heartbeat goes: three times in the watchdog's time."""
-        return max(1, int(self.watchdog / (3.0 * period) + 1e-9))
+        """Return after how many ticks of `period` s a heartbeat goes: ten times in the watchdog's time."""
+        return max(1, int(self.watchdog / (10.0 * period) + 1e-9))
 
     @property
     def heartbeat_ms(self) -> int:

@@ -39,7 +39,7 @@ def test_it_is_ready_for_an_adapter_and_for_the_kernels_interface() -> None:
         ),
         (("node: 5 ", "node: 200 "), ["run.yaml:", "device.node"]),
         (("node: 5 ", "nodes: 5 "), ["run.yaml:", "nodes"]),
-        (("watchdog: 0.05 ", "watchdog: 0.001 "), ["run.yaml:", "device.watchdog"]),
+        (("watchdog: 0.1 ", "watchdog: 0.001 "), ["run.yaml:", "device.watchdog"]),
         (("node: 5 ", "host_node: 5\n  node: 5 "), ["run.yaml:", "device.host_node", "own node"]),
     ],
 )
