@@ -198,6 +198,8 @@ def serve(
     server: PlantServer | FirmwareServer
     if firmware is None:
         server = PlantServer(stage, seed=seed, link=link, watchdog=watchdog)
+    elif watchdog is not None:
+        raise ConfigError("plant server: the host sets a board's watchdog; leave --watchdog out")
     elif link == "serial":
         server = FirmwareServer(stage, firmware, seed=seed)
     else:

@@ -155,5 +155,7 @@ def test_links_that_there_are_not(stage_file, stage):
         PlantProcess(stage_file, link="odrive")
     with pytest.raises(DeviceError, match="'serial' the host sets the watchdog"):
         PlantProcess(stage_file, watchdog=0.5)
+    with pytest.raises(DeviceError, match="leave --watchdog out"):
+        PlantProcess(stage_file, watchdog=0.5, firmware="/bin/true")
     with pytest.raises(DeviceError, match=r"firmware.*'serial'"):
         PlantProcess(stage_file, link="odrive-can", firmware="/bin/true")
