@@ -29,8 +29,8 @@ STAGE = {
     "sensor": {"resolution": 1e-9},
     "rate": 1.0 / PERIOD,
 }
-KINDS = ["simulated", "simulated, delayed", "replay", "serial", "odrive-can"]
-LINKS = ("serial", "odrive-can")
+KINDS = ["simulated", "simulated, delayed", "replay", "serial", "odrive-can", "cia402"]
+LINKS = ("serial", "odrive-can", "cia402")
 
 
 @dataclass
@@ -55,6 +55,12 @@ def plant(tmp_path_factory):
 @pytest.fixture(scope="module")
 def odrive(tmp_path_factory):
     with _serving(tmp_path_factory, "odrive-can", watchdog=1.0) as process:
+        yield process
+
+
+@pytest.fixture(scope="module")
+def canopen_drive(tmp_path_factory):
+    with _serving(tmp_path_factory, "cia402") as process:
         yield process
 
 
@@ -83,6 +89,10 @@ def bed(request):
         port = request.getfixturevalue("odrive").port
         settings |= {"interface": "slcan", "channel": port, "lead": 1e-3}
         settings |= {"watchdog": 1.0, "check_watchdog": False, "reply_timeout": 0.2}
+    elif kind == "cia402":
+        port = request.getfixturevalue("canopen_drive").port
+        settings |= {"interface": "slcan", "channel": port, "node": 5}
+        settings |= {"watchdog": 1.0, "reply_timeout": 0.2}
     device = create(settings, Bench(**bench))
     yield Bed(device, kind)
     device.close()
