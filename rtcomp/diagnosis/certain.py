@@ -136,7 +136,7 @@ def retunings(
         if i < 3 and old > 0 and abs(abs(new / old - 1.0) / BELIEVED - 1.0) < 0.05:
             half = max(half, BELIEVED * old)  # held there by the belief, not by the recording
         if old > 0 and abs(new / old - 1) > MOVED and abs(new - old) > half:
-            value = Value(new, new - half, new + half, for_axis(unit, believed.axis))
+            value = Value(new, max(new - half, 0.0), new + half, for_axis(unit, believed.axis))
             found.append(Retuned(name, float(old), value))
     return found
 
