@@ -15,30 +15,12 @@ from rtcomp.control.references import Reference, build_reference, check
 from rtcomp.errors import ConfigError, LimitError
 from rtcomp.hysteresis import Basis, Learner, basis_named, build_learner
 from rtcomp.hysteresis.interval import IntervalBasis
+from rtcomp.jobs.limit_settings import Limits, Loop, Positive
 from rtcomp.stage.schema import StageFile
 from rtcomp.stage.stage import Stage
 from rtcomp.yamlfile import Section, YamlFile, load_yaml, validate
 
-Positive = Annotated[float, Field(gt=0)]
-Window = Annotated[list[float], Field(min_length=2, max_length=2)]
 Times = Annotated[list[Annotated[float, Field(ge=0)]], Field(min_length=2, max_length=2)]
-
-
-class Limits(Section):
-    """The section ``limits``: beyond any of these the loop stops at zero volts, or does not start."""
-
-    travel: Window | None = Field(None, description="m, lowest and highest position")
-    speed: Positive | None = Field(None, description="m/s")
-    acceleration: Positive | None = Field(None, description="m/s^2, of references")
-    voltage: Positive | None = Field(None, description="V; at most the stage's voltage_limit")
-    slew: Positive | None = Field(None, description="V/s")
-
-    @field_validator("travel")
-    @classmethod
-    def _ordered(cls, value: list[float] | None) -> list[float] | None:
-        if value is not None and not value[0] < value[1]:
-            raise ValueError(f"is [{value[0]:g}, {value[1]:g}]; the lowest must come first")
-        return value
 
 
 class Identify(Section):
@@ -144,6 +126,7 @@ class RunFile(StageFile):
     clock: Literal["virtual", "wall"] | None = Field(None, description="wall on links, virtual in simulation")
     device: dict[str, Any] = Field(default_factory=lambda: {"driver": "simulated"})
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
+    loop: Loop = Field(default_factory=lambda: Loop.model_validate({}))
     identify: Identify | None = None
     judge: Judge = Field(default_factory=lambda: Judge.model_validate({}))
     relax: Relax | None = None

@@ -28,13 +28,14 @@ from rtcomp.hysteresis.lms import Lms
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
+from rtcomp.jobs.tick_settings import tick_settings
 from rtcomp.kernels import Floats
 from rtcomp.loop.clock import VirtualClock, WallClock
 from rtcomp.loop.device import Device
 from rtcomp.loop.realtime import in_force, realtime_process
 from rtcomp.loop.ring import Ring
 from rtcomp.loop.run import Outcome, run, stop_on_signals
-from rtcomp.loop.tick import COLUMNS, Tick, TickSettings
+from rtcomp.loop.tick import COLUMNS, Tick
 from rtcomp.recording.reader import Recording
 from rtcomp.recording.recorder import Recorder, RecorderSummary
 
@@ -159,19 +160,8 @@ def make_tick(
     limits = config.run.limits
     voltage = config.voltage_limit if closed_loop else 1e9
     gains = (controller.kp, controller.ki, controller.kd) if controller is not None else (0.0, 0.0, 0.0)
-    travel = limits.travel if closed_loop and limits.travel is not None else [-np.inf, np.inf]
     tick = Tick(
-        TickSettings(
-            period=config.period,
-            force_constant=stage.force_constant,
-            mass=stage.mass,
-            viscous=stage.mechanics.viscous,
-            gate=section.gate if section is not None else 0.0,
-            travel=(travel[0], travel[1]),
-            speed=(limits.speed or np.inf) * 10.0 if closed_loop else np.inf,
-            delay_ticks=delay_ticks,
-            closed_loop=closed_loop,
-        ),
+        tick_settings(config, delay_ticks, closed_loop),
         basis,
         learner,
         sections=_sections(config),
@@ -180,8 +170,8 @@ def make_tick(
         learn_offset=offset,
     )
     if model is not None:
-        tick.weights[:-1] = model.weights
-        tick.weights[-1] = model.offset / tick.offset_scale if tick.offset_scale else 0.0
+        offset_weight = model.offset / tick.offset_scale if tick.offset_scale else 0.0
+        tick.adopt_weights(np.append(model.weights, offset_weight))
     return tick
 
 
