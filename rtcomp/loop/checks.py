@@ -24,7 +24,8 @@ from rtcomp.loop.layout import (
     JUMP_LIMIT,
     LAST_SEQUENCE,
     LAST_TIME,
-    MEASURED,
+    MEASURED_AT,
+    MEASURED_SPEED,
     NO_POSITION,
     NOT_FINITE,
     OK,
@@ -43,6 +44,7 @@ from rtcomp.loop.layout import (
     SIGN_TICKS,
     SIGN_VOLTS,
     SILENT,
+    SINCE,
     SPEED,
     SPEED_LIMIT,
     STUCK,
@@ -53,8 +55,6 @@ from rtcomp.loop.layout import (
     TRAVEL,
     TRAVEL_HIGH,
     TRAVEL_LOW,
-    X1,
-    X2,
 )
 from rtcomp.loop.ring import STOPPED
 
@@ -113,16 +113,34 @@ def check(
     if position < settings[TRAVEL_LOW] or position > settings[TRAVEL_HIGH]:
         return TRAVEL
     if not fresh:
+        state[SINCE] += 1.0
         return OK
-    if state[MEASURED] > 0.0:
-        # Two samples of which one is late are up to two periods apart.
-        periods = 1.0 if state[GOOD] > 0.0 and row[ROW_OVERRUN] == 0.0 else 2.0
-        if abs(position - state[X1]) > settings[SPEED_LIMIT] * settings[PERIOD] * periods:
-            return SPEED
-        bend = abs(position - 2.0 * state[X1] + state[X2])
-        if bend > settings[JUMP_LIMIT] and state[GOOD] >= 2.0 and row[ROW_OVERRUN] == 0.0:
-            return JUMP
-    return follows(settings, state, position)
+    fault = moves(settings, state, position, row[ROW_OVERRUN] != 0.0 or state[GOOD] == 0.0)
+    return fault if fault != OK else follows(settings, state, position)
+
+
+@compiled
+def moves(settings: Floats, state: Floats, position: float, loose: bool) -> int:
+    """Tell whether the axis can have come here from where it was measured last, however long ago that is.
+
+    SPEED: not so fast. JUMP: no force there is bends its way so much; over n ticks that is n (n + 1) / 2
+    times as far as over one. `loose` where one of the two samples may be up to a period late. NaN, before
+    there were two samples, passes.
+    """
+    ticks = state[SINCE] + 1.0
+    moved = position - state[MEASURED_AT]
+    more = 1.0 if loose else 0.0
+    fault = OK
+    if abs(moved) > settings[SPEED_LIMIT] * settings[PERIOD] * (ticks + more):
+        fault = SPEED
+    else:
+        bend = abs(moved - state[MEASURED_SPEED] * ticks) - 2.0 * more * abs(state[MEASURED_SPEED])
+        if bend > settings[JUMP_LIMIT] * 0.5 * ticks * (ticks + 1.0):
+            fault = JUMP
+    state[MEASURED_SPEED] = moved / ticks
+    state[MEASURED_AT] = position
+    state[SINCE] = 0.0
+    return fault
 
 
 @compiled

@@ -12,16 +12,17 @@ import numpy as np
 
 from rtcomp.control.limits import FLAGS, limit_step
 from rtcomp.control.limits import NOT_FINITE as NO_NUMBER
-from rtcomp.control.pid import INTEGRAL, INTEGRAL_LIMIT, KI, pid_step
+from rtcomp.control.pid import INTEGRAL, INTEGRAL_LIMIT, KI, LAST_INPUT, ON_MEASUREMENT, pid_step
 from rtcomp.hysteresis.conditioning import settle, smooth
 from rtcomp.kernels import Floats, call_basis, call_learner, compiled
 from rtcomp.loop import layout as at
 from rtcomp.loop.checks import STALE_STATUS, check, is_new
-from rtcomp.loop.pace import keep_pace, lose_slot
+from rtcomp.loop.pace import degrade, keep_pace, lose_slot
 from rtcomp.loop.push import push
 from rtcomp.loop.states import State
 
 _COLUMNS = len(at.COLUMNS)
+_PART, _BLOWN_UP = 16, 1e200
 _CONNECTED, _RUNNING, _FAULT = float(State.CONNECTED), float(State.RUNNING), float(State.FAULT)
 
 
@@ -72,6 +73,9 @@ def identify(i: Identifier, settings: Floats, state: Floats, known: float, learn
     force = smooth(i.sections, i.force_memory, force)
     call_basis(i.basis, i.bp.ctypes.data, i.bs.ctypes.data, i.x.ctypes.data, position)
     model = says(i)
+    if not abs(model) < settings[at.FORCE_BOUND]:  # also where it is no number
+        put_aside(i, state)
+        model = says(i)
     row[at.ROW_FORCE] = force
     row[at.ROW_FORCE_MODEL] = model
     error = force - model
@@ -81,7 +85,7 @@ def identify(i: Identifier, settings: Floats, state: Floats, known: float, learn
         state[at.UPDATES] += 1.0
         call_learner(i.learner, i.lp.ctypes.data, i.ls.ctypes.data, i.x.ctypes.data, i.w.ctypes.data, error)
         row[at.ROW_LEARNING] = 1.0
-        if not abs(says(i)) < settings[at.FORCE_BOUND]:  # also where it is no number
+        if not (abs(says(i)) < settings[at.FORCE_BOUND] and sound(i.ls, int(state[at.UPDATES]))):
             put_aside(i, state)
 
 
@@ -92,6 +96,15 @@ def says(i: Identifier) -> float:
     for j in range(i.w.size):
         total += i.w[j] * i.x[j]
     return total
+
+
+@compiled
+def sound(ls: Floats, turn: int) -> bool:
+    """Tell whether the learner's state holds numbers: a part of it at each update, all of it in turn."""
+    total = 0.0
+    for j in range(min(_PART, ls.size)):
+        total += abs(ls[(turn * _PART + j) % ls.size])
+    return total < _BLOWN_UP
 
 
 @compiled
@@ -134,7 +147,10 @@ def tick_kernel(
     if not fresh and state[at.STARTED] > 0.0:
         position = state[at.X1] + plan[at.REFERENCE] - state[at.LAST_REFERENCE]
     closed = settings[at.CLOSED] > 0.0
+    gap = state[at.SINCE] > 0.0
     state[at.FAULT] = check(settings, state, row, header, position, fresh)
+    if not math.isfinite(plan[at.REFERENCE]):
+        state[at.FAULT] = at.COMMAND
     if state[at.FAULT] != at.OK:
         return stop_at_zero(c, state, row, header, rows)
     if state[at.STARTED] == 0.0:
@@ -158,27 +174,33 @@ def tick_kernel(
     late = (not fresh) if settings[at.DEVICE_PACED] > 0.0 else row[at.ROW_LATENESS] > settings[at.LATE_US]
     keep_pace(state, 1 if late else 0)
     row[at.ROW_STATE] = state[at.MODE]
-    state[at.MEASURED] = 1.0 if fresh else 0.0
     state[at.X2] = state[at.X1]
     state[at.X1] = position
     state[at.LAST_REFERENCE] = plan[at.REFERENCE]
 
+    # The compensator's memory follows the reference also while its share is nothing.
+    call_basis(i.basis, i.bp.ctypes.data, c.bs.ctypes.data, c.x.ctypes.data, plan[at.LEAD_POSITION])
+    lead = 0.0
+    for j in range(i.w.size):
+        lead += i.w[j] * c.x[j]
+    if not abs(lead) < settings[at.FORCE_BOUND]:
+        put_aside(i, state)
+        degrade(state)
+        row[at.ROW_STATE] = state[at.MODE]
     if state[at.SHARE] == 0.0 and state[at.HANDED] != 0.0 and c.pid_p[KI] > 0.0:
         # Feedforward goes off at once and without a jump: the integral takes over what it gave.
         most = c.pid_p[INTEGRAL_LIMIT]
         c.pid_s[INTEGRAL] = min(max(c.pid_s[INTEGRAL] + state[at.HANDED], -most), most)
     feedback = plan[at.VOLTS]
     if closed:
-        feedback = pid_step(c.pid_p, c.pid_s, plan[at.REFERENCE] - position, position, state[at.EXCESS])
-    # The compensator's memory follows the reference also while its share is nothing.
-    call_basis(i.basis, i.bp.ctypes.data, c.bs.ctypes.data, c.x.ctypes.data, plan[at.LEAD_POSITION])
+        error = plan[at.REFERENCE] - position
+        if gap and fresh:  # a derivative across what was not measured would be a kick
+            c.pid_s[LAST_INPUT] = -position if c.pid_p[ON_MEASUREMENT] == 1.0 else error
+        feedback = pid_step(c.pid_p, c.pid_s, error, position, state[at.EXCESS])
     feedforward = 0.0
     share = plan[at.FEEDFORWARD] * state[at.SHARE]
     if share > 0.0:
-        force = plan[at.LEAD_FORCE]
-        for j in range(i.w.size):
-            force += i.w[j] * c.x[j]
-        feedforward = share * force / settings[at.FORCE_CONSTANT]
+        feedforward = share * (plan[at.LEAD_FORCE] + lead) / settings[at.FORCE_CONSTANT]
     state[at.HANDED] = feedforward
     asked = feedback + feedforward
     volts = limit_step(c.limit_p, c.limit_s, asked)
@@ -209,7 +231,7 @@ def lost_kernel(
     lose_slot(settings, state)
     # What came before the gap is no neighbour of what comes after it.
     state[at.GOOD] = 0.0
-    state[at.MEASURED] = 0.0
+    state[at.SINCE] += 1.0
     state[at.X1] += plan[at.REFERENCE] - state[at.LAST_REFERENCE]
     state[at.LAST_REFERENCE] = plan[at.REFERENCE]
     row[at.ROW_STATE] = state[at.MODE]

@@ -40,15 +40,14 @@ of the checks: m, m (one count), V, ticks, V, ticks (half of the window), ticks,
 which a tick is late, slots lost until a fault, 1 where the device sets the pace; N beyond which a model is
 not believed."""
 (
-    GOOD, X1, X2, LAST_REFERENCE, LEARNED_AT, EXCESS, FAULT, COMPUTED, UPDATES, STARTED, MEASURED,
+    GOOD, X1, X2, LAST_REFERENCE, LEARNED_AT, EXCESS, FAULT, COMPUTED, UPDATES, STARTED,
     MODE, SHARE, HANDED, LATE_RUN, LATE_BITS, LATE_SUM, CLEAN, LOST, HELD, DIVERGED, DEGRADED_TIMES,
     AGE, INVALID_RUN, REPEATED_RUN, REPEATED, LAST_SEQUENCE, LAST_TIME,
-    STUCK_RUN, STUCK_AT, PUSHED, PUSHED_AT, PUSHED_MID, HISTORY,
-) = range(34)  # fmt: skip
+    MEASURED_AT, MEASURED_SPEED, SINCE, STUCK_RUN, STUCK_AT, PUSHED, PUSHED_AT, PUSHED_MID, HISTORY,
+) = range(36)  # fmt: skip
 """State: good samples in a row until now; positions one and two ticks ago (m); reference one tick ago (m);
 position at the last update (m); what the limits cut from the last command (V); what the check found;
-execution time of the last tick (us); updates of the weights; whether there was a sample; whether the position
-one tick ago was measured, if only late.
+execution time of the last tick (us); updates of the weights; whether there was a sample.
 
 Of the states and the pace: `states.State`; share of the feedforward that the state lets through; the
 feedforward of the last tick (V); late ticks in a row; the last 32 ticks, a bit each, and how many were late;
@@ -56,8 +55,9 @@ ticks in time in a row; slots lost and not forgiven; ticks until a diverged iden
 diverged; how often degraded.
 
 Of the checks: ticks since a sample was new; without a valid position; with a sample that was not new, in a
-row and in all; the last sequence and device time; ticks stuck, and where (m); ticks driven one way (signed),
-and where that began and was half over (m). From here on the commands of the last ticks, newest first (V)."""
+row and in all; the last sequence and device time; the last measured position (m), the speed there (m a tick),
+and the ticks since; ticks stuck, and where (m); ticks driven one way (signed), and where that began and was
+half over (m). From here on the commands of the last ticks, newest first (V)."""
 
 LATE_IN_ROW, LATE_OF, WINDOW, CLEAN_TICKS = 3, 8, 32, 32
 """Late ticks in a row, and among the last `WINDOW`, that degrade; ticks in time after which it is over."""
