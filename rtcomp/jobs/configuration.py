@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -15,6 +15,7 @@ from rtcomp.control.references import Reference, build_reference, check
 from rtcomp.errors import ConfigError, LimitError
 from rtcomp.hysteresis import Basis, Learner, basis_named, build_learner
 from rtcomp.hysteresis.interval import IntervalBasis
+from rtcomp.jobs.arming import Arming
 from rtcomp.jobs.limit_settings import Limits, Loop, Positive
 from rtcomp.stage.schema import StageFile
 from rtcomp.stage.stage import Stage
@@ -144,6 +145,8 @@ class Configuration:
     file: YamlFile
     plant: Stage | None = None
     """What the driver ``simulated`` simulates, where that is not what is believed."""
+    arming: Arming = field(default_factory=Arming)
+    """Whether hardware may move."""
 
     @classmethod
     def load(cls, path: str | Path) -> Configuration:
@@ -193,6 +196,12 @@ class Configuration:
     def real_device(self) -> bool:
         """Whether the stage stands somewhere, with a past: on everything but simulation and replay."""
         return self.run.device.get("driver") not in ("simulated", "replay")
+
+    @property
+    def stop_file(self) -> Path | None:
+        """The file that stops a run while it exists; a relative one lies beside the configuration."""
+        name = self.run.limits.stop_file
+        return None if name is None else self.path.parent / name
 
     def relaxing(self, start: float) -> Reference | None:
         """Return the decaying reversals about `start` (m) of the section ``relax``, checked, if any."""
@@ -274,7 +283,7 @@ class Configuration:
     def changed(self, **sections: Any) -> Configuration:
         """Return the configuration with whole top-level sections replaced."""
         changed = Configuration.of(replace(self.file, data={**self.file.data, **sections}))
-        return replace(changed, plant=self.plant)
+        return replace(changed, plant=self.plant, arming=self.arming)
 
     def simulating(self, plant: Stage) -> Configuration:
         """Return the configuration with `plant` simulated; the loop goes on believing its own stage."""

@@ -34,6 +34,8 @@ class Limits(Section):
         None, description="V at which the axis must move, and that way; without it 0.98 of the voltage limit"
     )
 
+    stop_file: str | None = Field(None, min_length=1, description="path; while it exists nothing runs")
+
     @field_validator("travel")
     @classmethod
     def _ordered(cls, value: list[float] | None) -> list[float] | None:

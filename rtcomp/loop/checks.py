@@ -13,6 +13,7 @@ from rtcomp.kernels import Floats, compiled
 from rtcomp.loop.layout import (
     AGE,
     AGE_TICKS,
+    CLOSED,
     COUNT,
     ESTOP,
     FROZEN,
@@ -47,6 +48,7 @@ from rtcomp.loop.layout import (
     SINCE,
     SPEED,
     SPEED_LIMIT,
+    STARTED,
     STUCK,
     STUCK_AT,
     STUCK_RUN,
@@ -108,6 +110,8 @@ def check(
             return FROZEN
         if state[AGE] > settings[AGE_TICKS]:
             return SILENT
+        if state[STARTED] == 0.0 and settings[CLOSED] > 0.0:
+            return OK  # nothing is taken from it, and nothing goes out
     if not math.isfinite(position) or (position != 0.0 and abs(position) < _SMALLEST):
         return NOT_FINITE
     if position < settings[TRAVEL_LOW] or position > settings[TRAVEL_HIGH]:

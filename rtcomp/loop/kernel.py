@@ -23,7 +23,7 @@ from rtcomp.loop.states import State
 
 _COLUMNS = len(at.COLUMNS)
 _PART, _BLOWN_UP = 16, 1e200
-_CONNECTED, _RUNNING, _FAULT = float(State.CONNECTED), float(State.RUNNING), float(State.FAULT)
+_RUNNING, _FAULT = float(State.RUNNING), float(State.FAULT)
 
 
 class Identifier(NamedTuple):
@@ -155,7 +155,7 @@ def tick_kernel(
         return stop_at_zero(c, state, row, header, rows)
     if state[at.STARTED] == 0.0:
         if not fresh and closed:
-            row[at.ROW_STATE] = _CONNECTED
+            row[at.ROW_STATE] = state[at.MODE]
             row[at.ROW_VOLTAGE] = row[at.ROW_FEEDFORWARD] = row[at.ROW_FEEDBACK] = 0.0
             push(header, rows, row)
             return 0.0

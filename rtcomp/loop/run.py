@@ -131,9 +131,12 @@ def run(
     seconds = 0.0
     stopped_by = "end"
     ended = 2
+    # What was only looked at is at zero and is not armed, not even to be told so.
+    untouched = isinstance(device, Armable)
     warm_up(tick)
     try:
         connect(device, machine, tick, int(header[STOPPED]))
+        untouched = False
         began = time.perf_counter()
         clock.start(period)
         volts = 0.0
@@ -211,7 +214,8 @@ def run(
         # Whatever happened: zero volts, then let go; a failure of the one must not keep us from the other.
         try:
             with contextlib.suppress(EndOfRun):
-                device.exchange(0.0)
+                if not untouched:
+                    device.exchange(0.0)
             if machine.state is State.STOPPING:
                 machine.take(Step.ZEROED)
         except OSError:
@@ -258,6 +262,7 @@ def connect(device: Device, machine: Machine, tick: Tick, stopped: int) -> None:
     machine.take(Step.SAMPLE, sample.position)
     device.arm()
     machine.take(Step.ARM, sample.position)
+    tick.state[at.MODE] = State.ARMED
 
 
 def follow(machine: Machine, mode: State, position: float) -> None:

@@ -10,7 +10,6 @@ from rtcomp.loop.tick import Tick
 
 STOPPED_BY = {1: "asked for", 2: "the stop file", 3: "a key"}
 """What the number in the ring's header says of who asked for an emergency stop."""
-BY_FILE, BY_KEY = 2, 3
 
 
 def trip(tick: Tick, number: int, position: float, asked: int = 0) -> RtcompError:
