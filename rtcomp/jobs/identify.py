@@ -63,6 +63,7 @@ class Identified:
             "ticks": outcome.ticks,
             "ticks_late": outcome.late,
             "slots_lost": outcome.lost,
+            "degraded": outcome.degraded,
             "stopped_by": outcome.stopped_by if self.signal is None else "signal",
             "notes": self.notes,
         }
