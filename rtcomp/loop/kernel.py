@@ -80,7 +80,13 @@ def identify(i: Identifier, settings: Floats, state: Floats, known: float, learn
     row[at.ROW_FORCE_MODEL] = model
     error = force - model
     moved = abs(position - state[at.LEARNED_AT])
-    if learn > 0.0 and state[at.HELD] == 0.0 and moved >= settings[at.GATE] and math.isfinite(error):
+    if abs(position - state[at.RESTED_AT]) > settings[at.COUNT]:
+        state[at.RESTED_AT] = position
+        state[at.RESTED] = 0.0
+    else:  # noise alone would move the weights without end
+        state[at.RESTED] += 1.0
+    may = state[at.HELD] == 0.0 and (state[at.RESTED] < at.REST_TICKS or settings[at.COUNT] == 0.0)
+    if learn > 0.0 and may and moved >= settings[at.GATE] and math.isfinite(error):
         state[at.LEARNED_AT] = position
         state[at.UPDATES] += 1.0
         call_learner(i.learner, i.lp.ctypes.data, i.ls.ctypes.data, i.x.ctypes.data, i.w.ctypes.data, error)

@@ -43,8 +43,9 @@ not believed."""
     GOOD, X1, X2, LAST_REFERENCE, LEARNED_AT, EXCESS, FAULT, COMPUTED, UPDATES, STARTED,
     MODE, SHARE, HANDED, LATE_RUN, LATE_BITS, LATE_SUM, CLEAN, LOST, HELD, DIVERGED, DEGRADED_TIMES,
     AGE, INVALID_RUN, REPEATED_RUN, REPEATED, LAST_SEQUENCE, LAST_TIME,
-    MEASURED_AT, MEASURED_SPEED, SINCE, STUCK_RUN, STUCK_AT, PUSHED, PUSHED_AT, PUSHED_MID, HISTORY,
-) = range(36)  # fmt: skip
+    MEASURED_AT, MEASURED_SPEED, SINCE, RESTED, RESTED_AT, STUCK_RUN, STUCK_AT, PUSHED, PUSHED_AT,
+    PUSHED_MID, HISTORY,
+) = range(38)  # fmt: skip
 """State: good samples in a row until now; positions one and two ticks ago (m); reference one tick ago (m);
 position at the last update (m); what the limits cut from the last command (V); what the check found;
 execution time of the last tick (us); updates of the weights; whether there was a sample.
@@ -56,8 +57,8 @@ diverged; how often degraded.
 
 Of the checks: ticks since a sample was new; without a valid position; with a sample that was not new, in a
 row and in all; the last sequence and device time; the last measured position (m), the speed there (m a tick),
-and the ticks since; ticks stuck, and where (m); ticks driven one way (signed), and where that began and was
-half over (m). From here on the commands of the last ticks, newest first (V)."""
+and the ticks since; ticks at rest, and where (m); ticks stuck, and where (m); ticks driven one way (signed),
+and where that began and was half over (m). From here on the commands of the last ticks, newest first (V)."""
 
 LATE_IN_ROW, LATE_OF, WINDOW, CLEAN_TICKS = 3, 8, 32, 32
 """Late ticks in a row, and among the last `WINDOW`, that degrade; ticks in time after which it is over."""
@@ -67,6 +68,8 @@ FADE = 1.0 / 128.0
 """Share of the feedforward that comes back with each tick."""
 REPEATED_TICKS = 5
 """Samples in a row that say they are new and are not, after which the device is not believed."""
+REST_TICKS = 100.0
+"""Ticks within a count of one place after which the axis rests: there is nothing to learn from."""
 HELD_TICKS = 1000.0
 """Ticks that a diverged identifier is put aside."""
 MOST_DIVERGED = 3.0

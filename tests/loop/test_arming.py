@@ -96,7 +96,12 @@ def test_before_the_first_good_sample_nothing_goes_out():
 
 
 @settings(max_examples=40, deadline=None)
-@given(st.floats(-5e-4, 5e-4), st.floats(-6.0, 6.0), st.integers(1, 400), st.sampled_from([0, 1]))
+@given(
+    st.integers(-500, 500).map(lambda um: 1e-6 * um),
+    st.integers(-60, 60).map(lambda v: 0.1 * v),
+    st.integers(1, 400),
+    st.sampled_from([0, 1]),
+)
 def test_arming_anywhere_with_friction_preloaded_commands_no_jump(start, push, ticks, delay):
     """Somebody, or something, has pushed the axis and let it go; where it stands is where it begins."""
     bench = Bench(stage=stage(), period=1e-3, start=start)
