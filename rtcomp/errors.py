@@ -5,7 +5,9 @@ RtcompError                 one clear line, exit status 2
 ├── RecordingError          a recording that cannot be used (also a ValueError)
 ├── OutputExistsError       an output that would be overwritten (also a FileExistsError)
 ├── LimitError              a motion or command outside what stage or limits allow (also a ValueError)
+├── EmergencyStopError      somebody, or the device, has stopped the loop for good
 └── DeviceError             a device that cannot be opened or has gone (also an OSError)
+    ├── NotArmedError       it may not be driven without being asked for
     ├── DeviceBusyError     its port is used by somebody else
     ├── DeviceTimeoutError  it does not answer (also a TimeoutError)
     └── ProtocolError       it answers, but not as the protocol says
@@ -57,8 +59,16 @@ class LimitError(RtcompError, ValueError):
     """A reference or command leaves what the stage or the limits allow."""
 
 
+class EmergencyStopError(RtcompError):
+    """An emergency stop by key, file or device: zero volts in one tick, and nothing goes on by itself."""
+
+
 class DeviceError(RtcompError, OSError):
     """A device cannot be opened, or has gone while running."""
+
+
+class NotArmedError(DeviceError):
+    """Hardware was not to be driven: nobody asked for it, or this machine cannot keep its deadlines."""
 
 
 class DeviceBusyError(DeviceError):

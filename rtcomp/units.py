@@ -24,6 +24,7 @@ COLUMN_UNITS: dict[str, str] = {
     "execution_us": "us",
     "overrun": "1",
     "learning": "1",
+    "state": "1",
     "outlier": "1",
     "force_drive": "N",
     "force_motion": "N",

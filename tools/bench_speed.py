@@ -83,13 +83,14 @@ def tick_us(config: Configuration) -> tuple[float, float]:
     plan = ReferencePlan(reference, config.stage, config.period, 20000, 0, ALWAYS, 0.0)
     table = plan.rows(0, plan.ticks)
     ring = Ring.create(plan.ticks, tick.row_width)
-    row, position = tick.row, COLUMNS.index("position")
+    row, position, sequence = tick.row, COLUMNS.index("position"), COLUMNS.index("sequence")
     alone, both = np.empty(plan.ticks), np.empty(plan.ticks)
     device.open()
     volts = 0.0
     for k in range(plan.ticks):
         began = time.perf_counter_ns()
         row[position] = device.exchange(volts).position
+        row[sequence] = k + 1.0
         then = time.perf_counter_ns()
         volts = tick_kernel(
             table[k],

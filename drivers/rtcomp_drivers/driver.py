@@ -57,13 +57,17 @@ class DriverSettings(BaseModel):
 class Driver:
     """Base of drivers: a Device that is built from its settings and the bench.
 
-    Subclasses set `name`, `Settings` and `delay_ticks` and write `open`, `exchange` and `close`. Also a
+    Subclasses set `name`, `Settings` and `delay_ticks` and write `open`, `exchange` and `close`; what can be
+    looked at before it is armed has `look` and `arm` as well (`rtcomp.loop.device.Armable`). Also a
     context manager: leaving it closes the device.
     """
 
     name: ClassVar[str]
     """The name in configurations and messages."""
     Settings: ClassVar[type[DriverSettings]]
+    hardware: bool = True
+    """Whether something real moves: hardware is armed only where it was asked for. False for simulations, and
+    for links whose other side, once open, says that it is one."""
 
     def __init__(self, settings: Any, bench: Bench) -> None:
         self.settings = settings
@@ -74,6 +78,8 @@ class Driver:
         """What went other than it should, counted; may be empty."""
         self.remarks: list[str] = []
         """What a person should know about this device before relying on it; one line each."""
+        self.who = ""
+        """What is there, for messages to people, once open."""
 
     def open(self) -> None:
         """Take the device; does nothing where it is open already. Raises DeviceError."""

@@ -19,6 +19,7 @@ class ReplayDriver(Driver):
     """A recording played back as the stage; the identifier learns from what was recorded."""
 
     name = "replay"
+    hardware = False
     Settings = ReplaySettings
 
     def __init__(self, settings: ReplaySettings, bench: Bench) -> None:

@@ -26,6 +26,8 @@ _HALF = 1 << 31
 _MOST_VOLTS = 1e-6 * ((1 << 31) - 1)
 _ROUND_TRIP_BYTES = 48
 """COMMAND and SAMPLE on the line, with coding and delimiters."""
+_STAND_INS = ("rtcomp plant", "rtcomp firmware on the host")
+"""How what stands in for hardware begins the text of its INFO."""
 _COUNTERS = (
     "sent", "unsent", "samples", "missed", "late", "duplicate", "frozen", "clamped", "lagging", "bad_frames",
     "unknown_frames",
@@ -115,13 +117,34 @@ class SerialDriver(Driver):
             self.info = link.hello(self.settings.connect_timeout)
             self._check_fit(link, self.info)
             self._count_size = self.info.count_size
+            self.who = link.who
+            self.hardware = not self.info.text.startswith(_STAND_INS)
             if self.info.state == FAULT:
                 self._clear(link, self.info)
-            self._first_sample(link)
+            self._link = link
+            self.look()
         except BaseException:
+            self._link = None
             link.port.close()
             raise
-        self._link = link
+
+    def look(self) -> Sample:
+        """Return a new sample of the board as it is, disarmed: its output stays zero. Raises DeviceError."""
+        link = self._link
+        if link is None:
+            raise self.not_open()
+        seen = self._answered
+        for _ in range(3):
+            self._send(link, 0)
+            end = time.monotonic() + ASK_AGAIN_S
+            while self._answered == seen and (left := end - time.monotonic()) > 0.0:
+                self._read(link, link.take(left) or [])
+            if self._answered != seen:
+                break
+        else:
+            raise DeviceTimeoutError(f"{link.who}: answers, but sent no sample in {3 * ASK_AGAIN_S:.1f} s")
+        assert self._last is not None
+        return self._last
 
     def arm(self) -> None:
         """Arm the board; its watchdog runs from now on. The first exchange does it where nobody has."""
@@ -289,14 +312,3 @@ class SerialDriver(Driver):
         if reply.result != protocol.ACCEPTED or reply.state == FAULT:
             raise DeviceError(f"{link.who}: its fault cannot be cleared ({why}); switch it off and on")
         self.remarks.append(f"{link.who}: was in FAULT ({why}), cleared")
-
-    def _first_sample(self, link: SerialLink) -> None:
-        """Have a sample before anything depends on one. The board, not armed, ignores the command."""
-        for _ in range(3):
-            self._send(link, 0)
-            end = time.monotonic() + ASK_AGAIN_S
-            while self._last is None and (left := end - time.monotonic()) > 0.0:
-                self._read(link, link.take(left) or [])
-            if self._last is not None:
-                return
-        raise DeviceTimeoutError(f"{link.who}: answers, but sent no sample in {3 * ASK_AGAIN_S:.1f} s")

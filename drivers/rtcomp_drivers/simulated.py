@@ -24,6 +24,7 @@ class SimulatedDriver(Driver):
     """The stage simulated in process; runs as fast as it is asked."""
 
     name = "simulated"
+    hardware = False
     Settings = SimulatedSettings
 
     def __init__(self, settings: SimulatedSettings, bench: Bench) -> None:

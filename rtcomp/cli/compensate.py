@@ -33,6 +33,9 @@ def compensate(
     force: bool,
     port: str | None,
     clock: str | None,
+    armed: bool,
+    allow_non_rt: bool,
+    stop_file: Path | None,
     seconds: float | None,
     as_json: bool,
 ) -> None:
@@ -45,7 +48,7 @@ def compensate(
     Examples:
       rtcomp compensate configs/leuven.yaml --stage stage.yaml --out out/tracking
       rtcomp compensate configs/leuven.yaml --model out/leuven/model.yaml --out out/tracking
-      rtcomp compensate configs/leuven.yaml --port /dev/ttyACM0 --model out/board/model.yaml
+      rtcomp compensate configs/leuven.yaml --port /dev/ttyACM0 --armed --model out/board/model.yaml
     """
     from rtcomp.hysteresis.model import HysteresisModel
     from rtcomp.jobs.compensate import check_stage
@@ -59,7 +62,10 @@ def compensate(
 
     if model is not None and stage_file is not None:
         raise click.UsageError("--model and --stage are both given; feed forward the one or the other")
-    chosen = load(config, port=port, clock=clock, seconds=seconds)
+    chosen = load(
+        config, port=port, clock=clock, seconds=seconds, armed=armed, allow_non_rt=allow_non_rt,
+        stop_file=stop_file,
+    )  # fmt: skip
     known = HysteresisModel.load(model) if model is not None else None
     stage = Stage.load(stage_file) if stage_file is not None else None
     if stage is not None:

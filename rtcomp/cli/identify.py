@@ -27,6 +27,9 @@ def identify(
     force: bool,
     port: str | None,
     clock: str | None,
+    armed: bool,
+    allow_non_rt: bool,
+    stop_file: Path | None,
     seconds: float | None,
     mapping: dict[str, str],
     as_json: bool,
@@ -42,9 +45,12 @@ def identify(
     Examples:
       rtcomp identify configs/leuven.yaml --out out/leuven
       rtcomp identify configs/heads_yaw.yaml yaw.csv.gz --out out/yaw
-      rtcomp identify configs/leuven.yaml --port /dev/ttyACM0 --out out/board
+      rtcomp identify configs/leuven.yaml --port /dev/ttyACM0 --armed --out out/board
     """
-    chosen = load(config, port=port, clock=clock, seconds=seconds)
+    chosen = load(
+        config, port=port, clock=clock, seconds=seconds, armed=armed, allow_non_rt=allow_non_rt,
+        stop_file=stop_file,
+    )  # fmt: skip
     chosen.identify  # noqa: B018 -- raises where the section is missing
     from rtcomp.jobs.identify import identify as run
     from rtcomp.jobs.session import check

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -18,7 +19,10 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def device_options(function: F) -> F:
-    """Add ``--port`` (argument `port`) and ``--clock`` (argument `clock`)."""
+    """Add ``--port`` (argument `port`), ``--clock`` (`clock`), and what it takes to move hardware.
+
+    That is ``--armed`` (`armed`), ``--allow-non-rt`` (`allow_non_rt`) and ``--stop-file`` (`stop_file`).
+    """
     port = click.option(
         "--port",
         metavar="PORT",
@@ -27,16 +31,36 @@ def device_options(function: F) -> F:
     clock = click.option(
         "--clock", type=click.Choice(["virtual", "wall"]), help="Run as fast as possible, or in real time."
     )
-    return port(clock(function))
+    armed = click.option("--armed", is_flag=True, help="Real hardware may move; without it nothing is armed.")
+    anyway = click.option(
+        "--allow-non-rt", is_flag=True, help="Move hardware without SCHED_FIFO and locked memory too."
+    )
+    stop_file = click.option(
+        "--stop-file", metavar="PATH", type=click.Path(path_type=Path),
+        help="Emergency stop: when this file appears, zero volts at once.",
+    )  # fmt: skip
+    return port(clock(armed(anyway(stop_file(function)))))
 
 
 def load(
-    path: Path, *, port: str | None = None, clock: str | None = None, seconds: float | None = None
+    path: Path,
+    *,
+    port: str | None = None,
+    clock: str | None = None,
+    seconds: float | None = None,
+    armed: bool = False,
+    allow_non_rt: bool = False,
+    stop_file: Path | None = None,
 ) -> Configuration:
     """Read a run configuration and apply what the command line changes."""
+    from rtcomp.cli.countdown import Countdown
+    from rtcomp.jobs.arming import Arming
     from rtcomp.jobs.configuration import Configuration
 
-    config = Configuration.load(path)
+    config = replace(Configuration.load(path), arming=Arming(armed, allow_non_rt, Countdown()))
+    if stop_file is not None:
+        limits = {**(config.file.data.get("limits") or {}), "stop_file": str(stop_file.absolute())}
+        config = config.changed(limits=limits)
     if port is not None:
         config = config.changed(device=_at(port, config.run.device))
     if clock is not None:

@@ -17,6 +17,9 @@ APPLIED, FLAGS, CLAMPED_TICKS, SLEWED_TICKS, NOT_FINITE_TICKS = 0, 1, 2, 3, 4
 """State: voltage let through last (V), flags of the last tick, and the ticks counted for each flag."""
 STATES = 5
 
+_SMALLEST = 2.2250738585072014e-308
+"""V below which a number has lost digits (denormal): such a command is zero."""
+
 CLAMPED, SLEWED, NOT_FINITE = 1, 2, 4
 """Flags, added together in ``s[FLAGS]``."""
 
@@ -47,7 +50,8 @@ def limit_step(p: Floats, s: Floats, volts: float) -> float:
     """Return the voltage (V) that may go out for the command `volts` (V); count and flag what was changed.
 
     Clamped to +-p[LIMIT], then to within p[STEP] of the voltage before. A command that is not finite
-    becomes zero volts at once, whatever the slew: where the arithmetic has failed, nothing else is safe.
+    becomes zero volts at once, whatever the slew: where the arithmetic has failed, nothing else is safe. A
+    denormal one is zero: converters and other arithmetic do not agree on what it is.
     `s` is advanced in place; the result is always finite.
     """
     flags = 0.0
@@ -74,6 +78,8 @@ def limit_step(p: Floats, s: Floats, volts: float) -> float:
             out = before - p[STEP]
             flags += SLEWED
             s[SLEWED_TICKS] += 1.0
+        if abs(out) < _SMALLEST:
+            out = 0.0
     s[APPLIED] = out
     s[FLAGS] = flags
     return out

@@ -60,6 +60,7 @@ class Compensated:
             "ticks": self.with_it.outcome.ticks,
             "ticks_late": self.without.outcome.late + self.with_it.outcome.late,
             "slots_lost": self.without.outcome.lost + self.with_it.outcome.lost,
+            "degraded": self.without.outcome.degraded + self.with_it.outcome.degraded,
             "stopped_by": self.with_it.outcome.stopped_by,
         }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -15,30 +15,13 @@ from rtcomp.control.references import Reference, build_reference, check
 from rtcomp.errors import ConfigError, LimitError
 from rtcomp.hysteresis import Basis, Learner, basis_named, build_learner
 from rtcomp.hysteresis.interval import IntervalBasis
+from rtcomp.jobs.arming import Arming
+from rtcomp.jobs.limit_settings import Limits, Loop, Positive
 from rtcomp.stage.schema import StageFile
 from rtcomp.stage.stage import Stage
 from rtcomp.yamlfile import Section, YamlFile, load_yaml, validate
 
-Positive = Annotated[float, Field(gt=0)]
-Window = Annotated[list[float], Field(min_length=2, max_length=2)]
 Times = Annotated[list[Annotated[float, Field(ge=0)]], Field(min_length=2, max_length=2)]
-
-
-class Limits(Section):
-    """The section ``limits``: beyond any of these the loop stops at zero volts, or does not start."""
-
-    travel: Window | None = Field(None, description="m, lowest and highest position")
-    speed: Positive | None = Field(None, description="m/s")
-    acceleration: Positive | None = Field(None, description="m/s^2, of references")
-    voltage: Positive | None = Field(None, description="V; at most the stage's voltage_limit")
-    slew: Positive | None = Field(None, description="V/s")
-
-    @field_validator("travel")
-    @classmethod
-    def _ordered(cls, value: list[float] | None) -> list[float] | None:
-        if value is not None and not value[0] < value[1]:
-            raise ValueError(f"is [{value[0]:g}, {value[1]:g}]; the lowest must come first")
-        return value
 
 
 class Identify(Section):
@@ -144,6 +127,7 @@ class RunFile(StageFile):
     clock: Literal["virtual", "wall"] | None = Field(None, description="wall on links, virtual in simulation")
     device: dict[str, Any] = Field(default_factory=lambda: {"driver": "simulated"})
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
+    loop: Loop = Field(default_factory=lambda: Loop.model_validate({}))
     identify: Identify | None = None
     judge: Judge = Field(default_factory=lambda: Judge.model_validate({}))
     relax: Relax | None = None
@@ -161,6 +145,8 @@ class Configuration:
     file: YamlFile
     plant: Stage | None = None
     """What the driver ``simulated`` simulates, where that is not what is believed."""
+    arming: Arming = field(default_factory=Arming)
+    """Whether hardware may move."""
 
     @classmethod
     def load(cls, path: str | Path) -> Configuration:
@@ -210,6 +196,12 @@ class Configuration:
     def real_device(self) -> bool:
         """Whether the stage stands somewhere, with a past: on everything but simulation and replay."""
         return self.run.device.get("driver") not in ("simulated", "replay")
+
+    @property
+    def stop_file(self) -> Path | None:
+        """The file that stops a run while it exists; a relative one lies beside the configuration."""
+        name = self.run.limits.stop_file
+        return None if name is None else self.path.parent / name
 
     def relaxing(self, start: float) -> Reference | None:
         """Return the decaying reversals about `start` (m) of the section ``relax``, checked, if any."""
@@ -291,7 +283,7 @@ class Configuration:
     def changed(self, **sections: Any) -> Configuration:
         """Return the configuration with whole top-level sections replaced."""
         changed = Configuration.of(replace(self.file, data={**self.file.data, **sections}))
-        return replace(changed, plant=self.plant)
+        return replace(changed, plant=self.plant, arming=self.arming)
 
     def simulating(self, plant: Stage) -> Configuration:
         """Return the configuration with `plant` simulated; the loop goes on believing its own stage."""

@@ -13,13 +13,14 @@ from rtcomp.errors import Interrupted, RecordingError
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.hysteresis.prior import non_increasing
+from rtcomp.jobs.arming import permit
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.judge import Friction, Judgement, friction_of, judge, learning_curve, reached
 from rtcomp.jobs.lead import NOTHING, lead_volts
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
 from rtcomp.jobs.session import Run, Watch, check, make_device, make_tick, run_loop, stopped
 from rtcomp.kernels import Floats
-from rtcomp.loop.device import Device
+from rtcomp.loop.device import Armable, Device
 from rtcomp.loop.tick import Tick
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.balance import bandwidth, known_force, zero_phase
@@ -62,6 +63,7 @@ class Identified:
             "ticks": outcome.ticks,
             "ticks_late": outcome.late,
             "slots_lost": outcome.lost,
+            "degraded": outcome.degraded,
             "stopped_by": outcome.stopped_by if self.signal is None else "signal",
             "notes": self.notes,
         }
@@ -135,6 +137,7 @@ def follow(
     start = None
     if config.real_device:
         start = where_it_stands(device)
+        permit(config, device, start, config.reference(section, start))
         relaxing = config.relaxing(start)
         if relaxing is not None:
             config.reference(section, start)  # refuse what cannot be followed before anything moves
@@ -160,10 +163,13 @@ def _plan(config: Configuration, reference: Reference, device: Device) -> Refere
 
 
 def where_it_stands(device: Device) -> float:
-    """Open the device, ask for its position (m) at zero volts, close it. Raises DeviceError."""
+    """Open the device, ask for its position (m), close it. Raises DeviceError.
+
+    Where the device can be looked at, nothing is armed for that.
+    """
     device.open()
     try:
-        return device.exchange(0.0).position
+        return (device.look() if isinstance(device, Armable) else device.exchange(0.0)).position
     finally:
         device.close()
 

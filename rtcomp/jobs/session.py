@@ -6,6 +6,7 @@ import contextlib
 import json
 import math
 import platform
+import sys
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -28,13 +29,15 @@ from rtcomp.hysteresis.lms import Lms
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
+from rtcomp.jobs.tick_settings import tick_settings
 from rtcomp.kernels import Floats
 from rtcomp.loop.clock import VirtualClock, WallClock
 from rtcomp.loop.device import Device
 from rtcomp.loop.realtime import in_force, realtime_process
 from rtcomp.loop.ring import Ring
 from rtcomp.loop.run import Outcome, run, stop_on_signals
-from rtcomp.loop.tick import COLUMNS, Tick, TickSettings
+from rtcomp.loop.stop_watch import stop_watch
+from rtcomp.loop.tick import COLUMNS, Tick
 from rtcomp.recording.reader import Recording
 from rtcomp.recording.recorder import Recorder, RecorderSummary
 
@@ -159,19 +162,8 @@ def make_tick(
     limits = config.run.limits
     voltage = config.voltage_limit if closed_loop else 1e9
     gains = (controller.kp, controller.ki, controller.kd) if controller is not None else (0.0, 0.0, 0.0)
-    travel = limits.travel if closed_loop and limits.travel is not None else [-np.inf, np.inf]
     tick = Tick(
-        TickSettings(
-            period=config.period,
-            force_constant=stage.force_constant,
-            mass=stage.mass,
-            viscous=stage.mechanics.viscous,
-            gate=section.gate if section is not None else 0.0,
-            travel=(travel[0], travel[1]),
-            speed=(limits.speed or np.inf) * 10.0 if closed_loop else np.inf,
-            delay_ticks=delay_ticks,
-            closed_loop=closed_loop,
-        ),
+        tick_settings(config, delay_ticks, closed_loop),
         basis,
         learner,
         sections=_sections(config),
@@ -180,8 +172,8 @@ def make_tick(
         learn_offset=offset,
     )
     if model is not None:
-        tick.weights[:-1] = model.weights
-        tick.weights[-1] = model.offset / tick.offset_scale if tick.offset_scale else 0.0
+        offset_weight = model.offset / tick.offset_scale if tick.offset_scale else 0.0
+        tick.adopt_weights(np.append(model.weights, offset_weight))
     return tick
 
 
@@ -198,8 +190,9 @@ def run_loop(
 ) -> Run:
     """Run the loop once; record to `path` (HDF5) where one is given, in memory where not.
 
-    Raises what the loop raises (DeviceError, LimitError), and Interrupted where a signal has ended the run
-    (with `partial` only where it did so in the first moments); the recording up to there is kept.
+    Raises what the loop raises (DeviceError, LimitError, EmergencyStopError), and Interrupted where a signal
+    has ended the run (with `partial` only where it did so in the first moments); the recording up to there is
+    kept.
     """
     wall = config.wall_clock and tick.closed_loop
     columns = tuple(COLUMNS)
@@ -216,6 +209,9 @@ def run_loop(
                     later=tuple(in_loop),
                 )  # fmt: skip
             stop = stack.enter_context(stop_on_signals())
+            if tick.closed_loop:
+                keys = wall and config.real_device and sys.stdin is not None and sys.stdin.isatty()
+                stack.enter_context(stop_watch(ring, config.stop_file, keys))
             if wall and watch is not None:
                 stack.enter_context(watch.attach(ring, columns, plan.ticks))
             if wall:
@@ -231,6 +227,7 @@ def run_loop(
                 stop=stop,
                 progress=None if watch is None else lambda n, _: watch.update(n, plan.ticks, ring, columns),
                 recorder_alive=None if recorder is None else lambda: recorder.alive,
+                tell=None if recorder is None else recorder.tell,
             )
             if not wall and watch is not None:
                 watch.update(plan.ticks, plan.ticks, ring, columns)
@@ -284,6 +281,8 @@ def describe(config: Configuration, tick: Tick, more: Mapping[str, Any] | None =
         "stage": json.dumps(config.stage.to_dict()),
         "clock": "wall" if config.wall_clock else "virtual",
         "delay_ticks": int(tick.delay_ticks),
+        "armed": config.arming.armed,
+        "allow_non_rt": config.arming.allow_non_rt,
         "rtcomp_version": __version__,
         "python_version": platform.python_version(),
         "numpy_version": np.__version__,

@@ -9,6 +9,8 @@ STALE = 1
 """Status of a sample that is not new: the device did not answer in time and an older one is reused."""
 INVALID = 2
 """Status of a sample whose position must not be used."""
+ESTOP = 3
+"""Status of a sample by which a device says that its own emergency stop is pressed: the loop ends latched."""
 
 
 class EndOfRun(Exception):  # noqa: N818 - no error: a recording that plays the stage has been played
@@ -48,3 +50,14 @@ class Device(Protocol):
 
     def close(self) -> None:
         """Send zero volts and let go. Safe to call twice, and after a failure."""
+
+
+@runtime_checkable
+class Armable(Protocol):
+    """What a device has besides that can be looked at before it is armed. Real links have it."""
+
+    def look(self) -> Sample:
+        """Return a new sample; the device, not armed, puts out nothing. Raises DeviceError."""
+
+    def arm(self) -> None:
+        """Arm the device: from now on it acts on commands and its watchdog runs. Raises DeviceError."""

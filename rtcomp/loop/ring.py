@@ -1,8 +1,9 @@
 """The ring in shared memory: how the loop hands each tick over to other processes without ever waiting.
 
-One writer, any number of readers, one row of float64 a tick. Layout: a header of eight int64, then
+One writer, any number of readers, one row of float64 a tick. Layout: a header of sixteen int64, then
 `capacity` rows of `width` float64. The writer fills the row, then counts it; it never looks at readers
-except at the recorder's mark, to count rows that the recorder had no chance to take.
+except at the recorder's mark, to count rows that the recorder had no chance to take, and at the mark by which
+any other process stops it.
 The memory is anonymous (no name that could leak or be squatted) and is inherited as a file descriptor.
 The compiled writer is `rtcomp.loop.push`: readers in other processes need not load a compiler.
 """
@@ -19,13 +20,14 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 
-MAGIC, CAPACITY, WIDTH, WRITTEN, TAKEN, CLOSED, LOST, FLUSHED = range(8)
+MAGIC, CAPACITY, WIDTH, WRITTEN, TAKEN, CLOSED, LOST, FLUSHED, STOPPED = range(9)
 """Places in the header: magic, rows, columns, rows ever written, rows the recorder has taken, writer has
 closed (0 running, 1 complete, 2 ended by an error), rows overwritten before they were taken, rows that the
-recorder has handed to the file system."""
+recorder has handed to the file system, emergency stop asked for (0 for none, else `stop` says by what)."""
 
 _MAGIC = 0x72746370  # "rtcp"
-_HEADER_BYTES = 64
+_HEADER = 16
+_HEADER_BYTES = 8 * _HEADER
 
 
 class Ring:
@@ -34,7 +36,7 @@ class Ring:
     def __init__(self, descriptor: int, memory: mmap.mmap, capacity: int, width: int) -> None:
         self.descriptor = descriptor
         self._memory = memory
-        self.header: np.ndarray = np.frombuffer(memory, dtype=np.int64, count=8)
+        self.header: np.ndarray = np.frombuffer(memory, dtype=np.int64, count=_HEADER)
         self.rows: Floats = np.frombuffer(memory, dtype=np.float64, offset=_HEADER_BYTES).reshape(
             capacity, width
         )
@@ -52,14 +54,15 @@ class Ring:
         os.ftruncate(descriptor, size)
         ring = cls(descriptor, mmap.mmap(descriptor, size), capacity, width)
         ring.rows[:] = 0.0
-        ring.header[:] = (_MAGIC, capacity, width, 0, 0, 0, 0, 0)
+        ring.header[:] = 0
+        ring.header[[MAGIC, CAPACITY, WIDTH]] = _MAGIC, capacity, width
         return ring
 
     @classmethod
     def attach(cls, descriptor: int) -> Ring:
         """Open the ring behind an inherited file descriptor."""
         memory = mmap.mmap(descriptor, os.fstat(descriptor).st_size)
-        header = np.frombuffer(memory, dtype=np.int64, count=8)
+        header = np.frombuffer(memory, dtype=np.int64, count=_HEADER)
         if int(header[MAGIC]) != _MAGIC:
             raise ValueError("the inherited descriptor is not a ring")
         return cls(descriptor, memory, int(header[CAPACITY]), int(header[WIDTH]))
@@ -99,6 +102,10 @@ class Ring:
     def close(self, ended: int = 1) -> None:
         """Tell readers that no more rows will come; `ended` is 1 for complete, 2 for ended by an error."""
         self.header[CLOSED] = ended
+
+    def stop(self, by: int = 1) -> None:
+        """Stop the loop at its next tick, at zero volts, latched: an emergency stop. From any process."""
+        self.header[STOPPED] = by
 
     def release(self) -> None:
         """Close the descriptor; the memory itself goes with the last array on it. Safe to call twice."""

@@ -12,13 +12,15 @@ from typing import Protocol
 
 import numpy as np
 
-from rtcomp.errors import DeviceError, LimitError
+from rtcomp.errors import DeviceError, EmergencyStopError, LimitError, RtcompError
 from rtcomp.kernels import Floats
-from rtcomp.loop import tick as t
+from rtcomp.loop import layout as at
 from rtcomp.loop.clock import Clock, VirtualClock
-from rtcomp.loop.device import Device, EndOfRun
-from rtcomp.loop.ring import Ring
-from rtcomp.loop.tick import COLUMNS, Compensator, Identifier, Tick, lost_kernel, tick_kernel
+from rtcomp.loop.device import OK, Armable, Device, EndOfRun
+from rtcomp.loop.ring import STOPPED, Ring
+from rtcomp.loop.states import HOLDING, Machine, State, Step
+from rtcomp.loop.tick import Compensator, Identifier, Tick, lost_kernel, tick_kernel
+from rtcomp.loop.trips import STOPPED_BY, trip
 
 BLOCK = 100_000
 """Rows of a plan asked for at a time: a run of up to this many ticks never computes references on the way."""
@@ -51,6 +53,12 @@ class Outcome:
     """``end``, ``signal`` or ``device`` (a recording that ended)."""
     seconds: float
     """Wall time of the loop."""
+    degraded: int = 0
+    """Times that feedforward went off for missed deadlines or a diverged identifier."""
+    diverged: int = 0
+    """Times that the identifier diverged and was taken back to its start."""
+    repeated: int = 0
+    """Samples that called themselves new and were not."""
 
 
 class Stop:
@@ -97,6 +105,8 @@ def run(
     stop: Stop | None = None,
     progress: Callable[[int, Floats], None] | None = None,
     recorder_alive: Callable[[], bool] | None = None,
+    machine: Machine | None = None,
+    tell: Callable[[float, int, str], None] | None = None,
 ) -> Outcome:
     """Open the device, run the plan, command zero, close the device; the ring is told that it is complete.
 
@@ -104,39 +114,36 @@ def run(
     nothing but the loop runs between two deadlines. On a virtual clock the loop waits for a full ring to be
     emptied as long as `recorder_alive()`, on a wall clock never.
 
-    Raises DeviceError where the device fails or reports no number, LimitError where the axis leaves its
-    limits; the device has been sent zero volts and closed by then.
+    `machine` is the state of the loop, followed through all of it. `tell(time (s), state, line)` is told why
+    it ended, before the ring is closed.
+
+    Raises DeviceError where the device fails or reports what cannot be, LimitError where the axis leaves its
+    limits or the command is no number, EmergencyStopError; the device has been sent zero volts and closed by
+    then.
     """
     virtual = isinstance(clock, VirtualClock)
     stop = stop or Stop()
-    period = float(tick.settings[t.PERIOD])
+    machine = machine or Machine()
+    period = float(tick.settings[at.PERIOD])
     row, state, settings = tick.row, tick.state, tick.settings
     header, rows = ring.header, ring.rows
-    position, device_time, sequence, status, late_us, spent_us, overrun = (
-        COLUMNS.index(name)
-        for name in (
-            "position",
-            "device_time",
-            "sequence",
-            "status",
-            "lateness_us",
-            "execution_us",
-            "overrun",
-        )
-    )
     late = lost = done = 0
     seconds = 0.0
     stopped_by = "end"
     ended = 2
+    # What was only looked at is at zero and is not armed, not even to be told so.
+    untouched = isinstance(device, Armable)
     warm_up(tick)
     try:
-        device.open()
+        connect(device, machine, tick, int(header[STOPPED]))
+        untouched = False
         began = time.perf_counter()
         clock.start(period)
         volts = 0.0
+        mode = state[at.MODE]
         shown = began
         first = last = 0
-        block = np.zeros((0, t.PLAN_WIDTH))
+        block = np.zeros((0, at.PLAN_WIDTH))
         while done < plan.ticks:
             if done == last:
                 first, last = done, min(done + BLOCK, plan.ticks)
@@ -149,14 +156,16 @@ def run(
             missed = 0
             if lateness >= period:
                 missed = min(int(lateness / period), last - 1 - done)
-                row[late_us] = lateness * 1e6
-                row[overrun] = 2.0
+                row[at.ROW_LATENESS] = lateness * 1e6
+                row[at.ROW_OVERRUN] = 2.0
                 for k in range(done, done + missed):
                     row[0] = k * period
-                    lost_kernel(block[k - first], row, state, header, rows)
+                    lost_kernel(block[k - first], settings, row, state, header, rows)
                 lost += missed
                 done += missed
                 lateness -= missed * period
+                if state[at.FAULT]:
+                    raise trip(tick, done - 1, float(state[at.X1]))
             try:
                 sample = device.exchange(volts)
             except EndOfRun:
@@ -165,20 +174,23 @@ def run(
             is_late = lateness > 0.1 * period
             late += is_late
             row[0] = done * period
-            row[position] = sample.position
-            row[device_time] = sample.time
-            row[sequence] = sample.sequence
-            row[status] = sample.status
-            row[late_us] = lateness * 1e6
-            row[spent_us] = state[t.COMPUTED]
-            row[overrun] = float(is_late or missed > 0)
+            row[at.ROW_POSITION] = sample.position
+            row[at.ROW_DEVICE_TIME] = sample.time
+            row[at.ROW_SEQUENCE] = sample.sequence
+            row[at.ROW_STATUS] = sample.status
+            row[at.ROW_LATENESS] = lateness * 1e6
+            row[at.ROW_EXECUTION] = state[at.COMPUTED]
+            row[at.ROW_OVERRUN] = float(is_late or missed > 0)
             volts = tick_kernel(
                 block[done - first], tick.identifier, tick.compensator, settings, state, row, header, rows
             )
             done += 1
-            state[t.COMPUTED] = (time.perf_counter_ns() - woken) * 1e-3
-            if state[t.FAULT]:
-                raise fault(tick, done - 1, sample.position)
+            state[at.COMPUTED] = (time.perf_counter_ns() - woken) * 1e-3
+            if state[at.MODE] != mode:
+                mode = state[at.MODE]
+                if mode == State.FAULT:
+                    raise trip(tick, done - 1, sample.position, int(header[STOPPED]))
+                follow(machine, State(int(mode)), sample.position)
             if virtual and not done & 255:
                 while recorder_alive is not None and ring.waiting > ring.capacity - 256 and recorder_alive():
                     time.sleep(0.001)
@@ -187,46 +199,99 @@ def run(
                     progress(done, row)
         seconds = time.perf_counter() - began
         ended = 1
+        if machine.state in HOLDING:
+            machine.take(Step.STOP)
+    except RtcompError as error:
+        fail(machine, str(error))
+        raise
+    except OSError as error:  # a driver's own, of a port that has gone
+        fail(machine, str(error))
+        raise DeviceError(f"the device has gone at tick {done}: {error}; check cable and power") from error
+    except BaseException as error:
+        fail(machine, f"{type(error).__name__}: {error}")
+        raise
     finally:
         # Whatever happened: zero volts, then let go; a failure of the one must not keep us from the other.
         try:
             with contextlib.suppress(EndOfRun):
-                device.exchange(0.0)
-        except DeviceError:
+                if not untouched:
+                    device.exchange(0.0)
+            if machine.state is State.STOPPING:
+                machine.take(Step.ZEROED)
+        except OSError:
             if ended == 1:
+                fail(machine, "zero volts did not arrive")
                 raise
         finally:
+            if tell is not None:
+                why = machine.why if machine.state is State.FAULT else f"ended by {stopped_by}"
+                tell(done * period, int(machine.state), why)
             ring.close(ended)
             device.close()
-    return Outcome(done, late, lost, tick.updates, stopped_by, seconds)
+            if machine.connected:
+                machine.take(Step.CLOSE)
+    counts = (int(state[place]) for place in (at.DEGRADED_TIMES, at.DIVERGED, at.REPEATED))
+    return Outcome(done, late, lost, tick.updates, stopped_by, seconds, *counts)
 
 
-def fault(tick: Tick, number: int, position: float) -> Exception:
-    """Return the error that says what the check of sample `number` found."""
-    s = tick.settings
-    at = f"at tick {number} ({number * s[t.PERIOD]:.4g} s)"
-    if tick.fault == t.NOT_FINITE:
-        return DeviceError(f"the device reported the position {position} {at}; stopped at zero volts")
-    if tick.fault == t.TRAVEL:
-        return LimitError(
-            f"position {position:g} m left the travel [{s[t.TRAVEL_LOW]:g}, {s[t.TRAVEL_HIGH]:g}] m {at}; "
-            "stopped at zero volts: check the sign of the feedback, or widen limits.travel"
+def connect(device: Device, machine: Machine, tick: Tick, stopped: int) -> None:
+    """Open the device and, where it can be looked at first, arm it if what is seen is in order.
+
+    Raises DeviceError or LimitError where it is not, EmergencyStopError where an emergency stop is asked for;
+    nothing is armed then.
+    """
+    device.open()
+    machine.take(Step.OPEN)
+    if stopped:
+        by = STOPPED_BY.get(stopped, "another process")
+        raise EmergencyStopError(f"emergency stop by {by}: nothing was armed; release it, then start again")
+    if not isinstance(device, Armable):
+        return  # its first exchange, at zero volts, is the look
+    sample = device.look()
+    low, high = tick.settings[at.TRAVEL_LOW], tick.settings[at.TRAVEL_HIGH]
+    if sample.status != OK or not np.isfinite(sample.position):
+        raise DeviceError(
+            f"the device has no position that can be used ({sample.position:g} m, status {sample.status}); "
+            "nothing was armed: check the sensor, home the axis"
         )
-    return LimitError(
-        f"position moved to {position:g} m faster than limits.speed = {s[t.SPEED_LIMIT]:g} m/s {at}; "
-        "stopped at zero volts: check the encoder, or raise limits.speed"
-    )
+    if not low <= sample.position <= high:
+        raise LimitError(
+            f"the axis stands at {sample.position:g} m, outside the travel [{low:g}, {high:g}] m; nothing "
+            "was armed: move it, or change limits.travel"
+        )
+    machine.take(Step.SAMPLE, sample.position)
+    device.arm()
+    machine.take(Step.ARM, sample.position)
+    tick.state[at.MODE] = State.ARMED
+
+
+def follow(machine: Machine, mode: State, position: float) -> None:
+    """Let the machine make the steps that the tick has made."""
+    if machine.state is State.CONNECTED:
+        machine.take(Step.SAMPLE, position)
+        machine.take(Step.ARM, position)
+    if machine.state is State.ARMED:
+        machine.take(Step.TICK)
+    if mode is not machine.state:
+        machine.take(Step.DEGRADE if mode is State.DEGRADED else Step.RECOVER)
+
+
+def fail(machine: Machine, why: str) -> None:
+    """Latch a fault, if there is anything to be at fault."""
+    if machine.state is not State.DISCONNECTED:
+        machine.take(Step.FAIL, why=why)
 
 
 def warm_up(tick: Tick) -> None:
     """Compile or load every kernel of the tick before anything is armed, on copies of its arrays."""
     scratch = Ring.create(2, tick.row_width)
-    plan = np.zeros(t.PLAN_WIDTH)
+    plan = np.zeros(at.PLAN_WIDTH)
     identifier = Identifier(*(a.copy() if isinstance(a, np.ndarray) else a for a in tick.identifier))  # type: ignore[arg-type]
     compensator = Compensator(*(a.copy() for a in tick.compensator))
     state, row = tick.state.copy(), tick.row.copy()
     for k in range(4):
-        row[COLUMNS.index("position")] = 1e-9 * k
+        row[at.ROW_POSITION] = 1e-9 * k
+        row[at.ROW_SEQUENCE] = k + 1.0
         tick_kernel(plan, identifier, compensator, tick.settings, state, row, scratch.header, scratch.rows)
-    lost_kernel(plan, row, state, scratch.header, scratch.rows)
+    lost_kernel(plan, tick.settings, row, state, scratch.header, scratch.rows)
     scratch.release()

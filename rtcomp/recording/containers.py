@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from rtcomp.errors import RecordingError
+from rtcomp.recording.events import read_events
 from rtcomp.recording.superblock import END_OF_FILE, FLAGS, SIGNATURE, SIZE, VERSION
 from rtcomp.recording.table import Floats, Table
 
@@ -100,11 +101,12 @@ def _own(file: Any, only: Collection[str] | None) -> Table:
         )
     if metadata.get("rows_lost"):
         notes.append(f"the recorder lost {metadata['rows_lost']} rows")
+    events = read_events(file)
     weights = None
     if "weights" in file:
         time, learnt = file["weights/time"][()], file["weights/weights"][()]
         weights = time[: len(learnt)], learnt[: len(time)]
-    return Table({name: column[:rows] for name, column in columns.items()}, metadata, notes, weights)
+    return Table({name: column[:rows] for name, column in columns.items()}, metadata, notes, weights, events)
 
 
 def _tree(group: Any, only: Collection[str] | None) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from rtcomp.errors import OutputExistsError, RecordingError, RtcompError
+from rtcomp.recording.events import write_events
 from rtcomp.recording.reader import Recording, read
 from rtcomp.recording.writer import replacing, write_csv
 from rtcomp.units import COLUMN_UNITS, for_axis
@@ -46,6 +47,8 @@ def convert(
         recording.notes.append(
             f"the identifier's weights are not in {target.name}: only HDF5 and MAT hold them"
         )
+    if recording.events and write is not _hdf5:
+        recording.notes.append(f"the events of the run are not in {target.name}: only HDF5 holds them")
     if recording.metadata and write is _csv:
         recording.notes.append(f"metadata is not in {target.name}: CSV has no place for it")
     return recording
@@ -89,6 +92,8 @@ def _hdf5(recording: Recording, target: Path, force: bool) -> None:
         if recording.weights is not None:
             file["weights/time"] = recording.weights_time
             file["weights/weights"] = recording.weights
+        if recording.events:
+            write_events(file, recording.events)
         metadata = {"format": "rtcomp recording 1", "complete": 1, "rows_lost": 0} | recording.metadata
         for key, value in metadata.items():
             file.attrs[key] = _text_or_number(value)

@@ -1,8 +1,9 @@
 """A recording being written: HDF5 that opens everywhere, whatever happens to its writer.
 
 One 1-D float64 dataset per column at the root, attribute ``unit``; metadata as root attributes; the
-identifier's weights, decimated, in the group ``weights``. Append-only, SWMR, so that it can be read while
-it grows. The format is bounded to HDF5 1.10, the first with SWMR, so that older readers (MATLAB) open it.
+identifier's weights, decimated, in the group ``weights``, what happened in ``events``. Append-only, SWMR,
+so that it can be read while it grows. The format is bounded to HDF5 1.10, the first with SWMR, so that older
+readers (MATLAB) open it.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from h5py import h5a, h5f, h5p
 
+from rtcomp.recording.events import Event, EventLog
 from rtcomp.recording.superblock import clear_flags
 from rtcomp.recording.writer import take_name
 from rtcomp.units import COLUMN_UNITS, for_axis
@@ -65,6 +67,7 @@ class RecordingFile:
                 self._weights = group.create_dataset(
                     "weights", (0, weights), "f8", maxshape=(None, weights), chunks=(_WEIGHTS_CHUNK, weights)
                 )
+            self._events = EventLog(self._file, list(columns))
             for key, value in metadata.items():
                 self._file.attrs[key] = _attribute(value)
             self._file.attrs["format"] = "rtcomp recording 1"
@@ -109,6 +112,7 @@ class RecordingFile:
             dataset[self.rows : end] = rows[:, i]
         self.rows = end
         self._unflushed += len(rows)
+        self._events.watch(rows)
         if self._weights is not None and self._weights_time is not None:
             chosen = self._due(rows[:, 0])
             if chosen:
@@ -117,6 +121,10 @@ class RecordingFile:
                 self._weights[at:to] = rows[chosen, len(self._columns) :]
                 self._weights_time.resize((to,))
                 self._weights_time[at:to] = rows[chosen, 0]
+
+    def add(self, event: Event) -> None:
+        """Append an event to the group ``events``."""
+        self._events.add(event)
 
     def _due(self, time: Floats) -> list[int]:
         """Return which of the rows at `time` begin a new period of the weights."""

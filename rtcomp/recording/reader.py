@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.recording import table as tables
+from rtcomp.recording.events import Event
 from rtcomp.recording.pieces import pieces, steps
 from rtcomp.recording.sampling import METHODS, Sampling, examine, in_gap, marks, resample
 from rtcomp.recording.table import Floats, Table
@@ -43,6 +44,8 @@ class Recording:
     """The identifier's weights as they were learnt, (rows, N) at `weights_time`; None where not recorded."""
     weights_time: Floats | None = None
     """s."""
+    events: list[Event] = field(default_factory=list)
+    """What happened in the run, in order; empty where it was not recorded."""
 
     def __len__(self) -> int:
         return len(self.columns["time"])
@@ -120,7 +123,7 @@ def read(
     sampling = examine(table.columns["time"])
     columns, rate = _even(path, table, sampling, rate_hz, method, mark_outliers)
     weights_time, weights = table.weights or (None, None)
-    return Recording(columns, rate, table.metadata, path, table.notes, weights, weights_time)
+    return Recording(columns, rate, table.metadata, path, table.notes, weights, weights_time, table.events)
 
 
 def load(path: Path, only: Collection[str] | None = None) -> Table:

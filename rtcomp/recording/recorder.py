@@ -22,7 +22,7 @@ from rtcomp.errors import OutputExistsError, RecordingError
 from rtcomp.loop.ring import CLOSED, FLUSHED, WRITTEN, Ring
 
 LONGEST_FLUSH_S = 0.1
-_RESERVED = ("complete", "rows_lost", "ended", "format")
+_RESERVED = ("complete", "rows_lost", "ended", "format", "event")
 
 
 @dataclass(frozen=True)
@@ -135,9 +135,19 @@ class Recorder:
         """
         if unknown := [name for name in values if name not in self._later]:
             raise ValueError(f"attribute {unknown[0]!r} was not announced to Recorder.start as later")
+        self._say(dict(values))
+
+    def tell(self, time: float, state: int, text: str) -> None:
+        """Have an event recorded: `time` (s from the start of the run), the loop's state, what happened.
+
+        To be called before the ring is closed; does not wait, and asks no living recorder.
+        """
+        self._say({"event": [time, state, text]})
+
+    def _say(self, what: Mapping[str, Any]) -> None:
         assert self._process.stdin is not None
         with contextlib.suppress(OSError, ValueError):  # it has died or is finished; `finish` tells
-            self._process.stdin.write((json.dumps(dict(values)) + "\n").encode())
+            self._process.stdin.write((json.dumps(what) + "\n").encode())
             self._process.stdin.flush()
 
     def finish(self, timeout: float = 10.0) -> RecorderSummary:

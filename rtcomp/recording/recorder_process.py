@@ -19,8 +19,11 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from rtcomp.loop.ring import CLOSED, FLUSHED, LOST, Ring
+from rtcomp.recording.events import Event
 from rtcomp.recording.file import CHUNK_ROWS, RecordingFile
 
+EVENT = "event"
+"""Key of a line that tells of an event, in place of the name of a text to fill in."""
 DRAIN_S = 0.02
 """How often waiting rows are taken from the ring."""
 
@@ -45,15 +48,23 @@ class _Parent:
         ready = select.select(watched, [], [], wait_s)[0]
         return self._descriptor in ready or os.getppid() != self._pid
 
-    def words(self) -> dict[str, str]:
-        """Return what it has said since the last call, without waiting."""
+    def words(self) -> tuple[dict[str, str], list[Event]]:
+        """Return what it has said since the last call, without waiting: texts to fill in, and events."""
         while self._input >= 0 and select.select([self._input], [], [], 0.0)[0]:
             piece = os.read(self._input, 65536)
             self._text += piece
             if not piece:
                 self._input = -1
         *lines, self._text = self._text.split(b"\n")
-        return {name: text for line in lines for name, text in json.loads(line).items()}
+        texts: dict[str, str] = {}
+        events = []
+        for line in lines:
+            for name, said in json.loads(line).items():
+                if name == EVENT:
+                    events.append(Event(*said))
+                else:
+                    texts[name] = said
+        return texts, events
 
 
 def _answer(**what: Any) -> None:
@@ -106,7 +117,10 @@ def _record(ring: Ring, file: RecordingFile, parent: _Parent, flush_s: float, as
             ended = "complete" if header[CLOSED] == 1 else "error"
         elif asked:
             ended = ended or "recorder told to end"
-        file.fill(parent.words())
+        texts, events = parent.words()
+        file.fill(texts)
+        for event in events:
+            file.add(event)
         waiting = ring.waiting
         more = True
         while more:

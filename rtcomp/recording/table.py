@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rtcomp.errors import RecordingError
+from rtcomp.recording.events import Event
 
 Floats = npt.NDArray[np.float64]
 
@@ -23,6 +24,7 @@ class Table:
     notes: list[str] = field(default_factory=list)
     weights: tuple[Floats, Floats] | None = None
     """The identifier's weights: times (n,) in s and weights (n, N)."""
+    events: list[Event] = field(default_factory=list)
 
 
 CSV, GZIP, MAT5, HDF5 = "CSV text", "a gzip file", "a MATLAB 5 file", "an HDF5 file"

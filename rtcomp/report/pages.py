@@ -17,6 +17,7 @@ from rtcomp.jobs.identify import Identified, friction_level
 from rtcomp.jobs.judge import Judgement
 from rtcomp.jobs.session import Run
 from rtcomp.kernels import Floats
+from rtcomp.loop.states import State
 from rtcomp.report.figures.hysteresis import first_reversal, loop_figure, virgin_figure
 from rtcomp.report.figures.learning import Curve, learning_figure
 from rtcomp.report.figures.motion import force_figure, position_figure
@@ -69,6 +70,14 @@ def timing_rows(*runs: Run) -> list[Row]:
         rows.append(Row("Lateness, median", float(np.median(late)) * 1e-6, "s"))
         rows.append(Row("Lateness, 99 %", float(np.percentile(late, 99)) * 1e-6, "s"))
         rows.append(Row("Scheduling", runs[-1].realtime.get("scheduling_class", "unknown")))
+    if degraded := sum(r.outcome.degraded for r in runs):
+        ticks_off = sum(int(np.count_nonzero(r.columns["state"] == State.DEGRADED)) for r in runs)
+        note = f"{ticks_off:,} ticks without feedforward: deadlines missed, or identifier put aside"
+        rows.append(Row("Degraded", f"{degraded:,} times", "", note))
+    if diverged := sum(r.outcome.diverged for r in runs):
+        rows.append(Row("Identifier put aside", f"{diverged:,} times", "", "it had diverged"))
+    if repeated := sum(r.outcome.repeated for r in runs):
+        rows.append(Row("Samples not new", f"{repeated:,}", "", "though the device said so; not used"))
     for run in runs:
         if run.recorder is not None and run.recorder.problem:
             rows.append(Row("Recording", run.recorder.problem))

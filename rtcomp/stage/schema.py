@@ -78,7 +78,8 @@ class Controller(Section):
 
 
 RUN_SECTIONS = (
-    "reference", "clock", "device", "limits", "identify", "judge", "relax", "compensate", "recording", "seed",
+    "reference", "clock", "device", "limits", "loop", "identify", "judge", "relax", "compensate", "recording",
+    "seed",
 )  # fmt: skip
 """What a run configuration holds beside its stage; reading it as a stage leaves these out."""
 

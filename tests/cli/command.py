@@ -37,7 +37,8 @@ sensor: {noise: 1.0e-9, resolution: 1.0e-8}
 controller: {kp: 2.0e4, ki: 2.0e5, kd: 100.0}
 rate: 1000.0
 reference: {kind: triangle, amplitude: 6.0e-5, frequency: 2.0, duration: 1.5}
-limits: {travel: [-1.0e-3, 1.0e-3], speed: 0.05}
+limits: {age: 10.0, travel: [-1.0e-3, 1.0e-3], speed: 0.05}
+loop: {slots_lost: 1000000}
 device: {driver: simulated, delay_ticks: 0}
 identify:
   intervals: 6

@@ -19,8 +19,8 @@ LEARNING = ("identify", "compensate")
 
 # What is written instead of what, what is said besides the line, and by which commands.
 OTHER_LINES = {
-    "model: stop\n  prior: non-increasing": 28, "seed: 3\nseed: 4": 42, "seed: {3": 42,
-    "  spacing: 2.0\n": 26,
+    "model: stop\n  prior: non-increasing": 29, "seed: 3\nseed: 4": 43, "seed: {3": 43,
+    "  spacing: 2.0\n": 27,
 }  # fmt: skip
 WRONG_KEYS = [
     ("mass: 2.0", "maas: 2.0", ["unknown key stage.maas; did you mean stage.mass?"], ALL),

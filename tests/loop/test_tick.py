@@ -21,6 +21,7 @@ from loop_rig import (
 
 from rtcomp.control.limits import limit_state, limit_step, limit_vector
 from rtcomp.control.pid import pid_state, pid_step, pid_vector
+from rtcomp.errors import LimitError
 from rtcomp.hysteresis.conditioning import low_pass, memory, settle, smooth
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.lms import Lms
@@ -180,18 +181,25 @@ def test_open_loop_sends_the_plan_s_voltages_and_no_feedback():
 def test_commands_keep_to_the_limits_whatever_is_asked():
     asked = plan(400, share=1.0, learn=False)
     asked.table[:, LEAD_FORCE] += 1e3 * np.sign(np.sin(0.05 * np.arange(400)))
-    asked.table[200, LEAD_FORCE] = np.nan
     left = go(device(stage()), tick(), asked)
     assert np.abs(left.column("voltage")).max() == 10.0
-    assert left.column("voltage")[200] == 0.0
     assert np.isfinite(left.column("voltage")).all() and np.isfinite(left.column("position")).all()
+
+
+def test_a_command_that_is_no_number_ends_the_run_at_zero_volts_in_its_tick():
+    asked = plan(400, share=1.0, learn=False)
+    asked.table[200, LEAD_FORCE] = np.nan
+    left = go(device(stage()), tick(weights=np.append(WEIGHTS, 0.0)), asked, error=LimitError)
+    assert "the command is no number at tick 200" in str(left.outcome)
+    assert len(left.rows) == 201 and left.column("voltage")[199] != 0.0 == left.column("voltage")[200]
+    assert left.device.commands[-1] == 0.0 and len(left.device.commands) == 202
 
 
 def test_warming_up_leaves_no_trace():
     fresh, warmed = tick(delay=1), tick(delay=1)
     warm_up(warmed)
     for name in ("weights", "state", "row"):
-        assert np.array_equal(getattr(fresh, name), getattr(warmed, name))
+        assert np.array_equal(getattr(fresh, name), getattr(warmed, name), equal_nan=True)
     for part in ("identifier", "compensator"):
         for a, b in zip(getattr(fresh, part), getattr(warmed, part), strict=True):
             assert np.array_equal(a, b)

@@ -1,0 +1,244 @@
+"""The tick's arithmetic, compiled: check, identify, keep pace, compensate, limit, hand over to the ring.
+
+Pure functions on preallocated arrays; `layout` says what stands where, `tick` puts the arrays together.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from rtcomp.control.limits import FLAGS, limit_step
+from rtcomp.control.limits import NOT_FINITE as NO_NUMBER
+from rtcomp.control.pid import INTEGRAL, INTEGRAL_LIMIT, KI, LAST_INPUT, ON_MEASUREMENT, pid_step
+from rtcomp.hysteresis.conditioning import settle, smooth
+from rtcomp.kernels import Floats, call_basis, call_learner, compiled
+from rtcomp.loop import layout as at
+from rtcomp.loop.checks import STALE_STATUS, check, is_new
+from rtcomp.loop.pace import degrade, keep_pace, lose_slot
+from rtcomp.loop.push import push
+from rtcomp.loop.states import State
+
+_COLUMNS = len(at.COLUMNS)
+_PART, _BLOWN_UP = 16, 1e200
+_RUNNING, _FAULT = float(State.RUNNING), float(State.FAULT)
+
+
+class Identifier(NamedTuple):
+    """The identifying half of the tick: a basis driven by the measurement, and what learns its weights."""
+
+    basis: int
+    bp: Floats
+    bs: Floats
+    x: Floats
+    learner: int
+    lp: Floats
+    ls: Floats
+    w: Floats
+    sections: Floats
+    position_memory: Floats
+    force_memory: Floats
+    ls_start: Floats
+    """The learner's state and the weights at the start: what a divergence goes back to."""
+    w_start: Floats
+
+
+class Compensator(NamedTuple):
+    """The compensating half: the same basis with a state of its own, driven by the reference; PID; limits."""
+
+    bs: Floats
+    x: Floats
+    pid_p: Floats
+    pid_s: Floats
+    limit_p: Floats
+    limit_s: Floats
+
+
+@compiled
+def identify(i: Identifier, settings: Floats, state: Floats, known: float, learn: float, row: Floats) -> None:
+    """Feed the measurement of one tick ago, whose force is known by now, to the basis and the learner.
+
+    The command is constant between ticks, so the force around a sample is the mean of the commands before
+    and after it, and the acceleration that belongs to it is the second difference of position.
+    """
+    period, delay = settings[at.PERIOD], int(settings[at.DELAY])
+    x0, x1, x2 = row[at.ROW_POSITION], state[at.X1], state[at.X2]
+    volts = 0.5 * (state[at.HISTORY + delay] + state[at.HISTORY + delay + 1])
+    force = settings[at.FORCE_CONSTANT] * volts - known
+    force -= settings[at.MASS] * (x0 - 2.0 * x1 + x2) / (period * period)
+    force -= settings[at.VISCOUS] * (x0 - x2) / (2.0 * period)
+    position = smooth(i.sections, i.position_memory, x1)
+    force = smooth(i.sections, i.force_memory, force)
+    call_basis(i.basis, i.bp.ctypes.data, i.bs.ctypes.data, i.x.ctypes.data, position)
+    model = says(i)
+    if not abs(model) < settings[at.FORCE_BOUND]:  # also where it is no number
+        put_aside(i, state)
+        model = says(i)
+    row[at.ROW_FORCE] = force
+    row[at.ROW_FORCE_MODEL] = model
+    error = force - model
+    moved = abs(position - state[at.LEARNED_AT])
+    if abs(position - state[at.RESTED_AT]) > settings[at.COUNT]:
+        state[at.RESTED_AT] = position
+        state[at.RESTED] = 0.0
+    else:  # noise alone would move the weights without end
+        state[at.RESTED] += 1.0
+    may = state[at.HELD] == 0.0 and (state[at.RESTED] < at.REST_TICKS or settings[at.COUNT] == 0.0)
+    if learn > 0.0 and may and moved >= settings[at.GATE] and math.isfinite(error):
+        state[at.LEARNED_AT] = position
+        state[at.UPDATES] += 1.0
+        call_learner(i.learner, i.lp.ctypes.data, i.ls.ctypes.data, i.x.ctypes.data, i.w.ctypes.data, error)
+        row[at.ROW_LEARNING] = 1.0
+        if not (abs(says(i)) < settings[at.FORCE_BOUND] and sound(i.ls, int(state[at.UPDATES]))):
+            put_aside(i, state)
+
+
+@compiled
+def says(i: Identifier) -> float:
+    """Return the model's force (N) for the identifier's regressors."""
+    total = 0.0
+    for j in range(i.w.size):
+        total += i.w[j] * i.x[j]
+    return total
+
+
+@compiled
+def sound(ls: Floats, turn: int) -> bool:
+    """Tell whether the learner's state holds numbers: a part of it at each update, all of it in turn."""
+    total = 0.0
+    for j in range(min(_PART, ls.size)):
+        total += abs(ls[(turn * _PART + j) % ls.size])
+    return total < _BLOWN_UP
+
+
+@compiled
+def put_aside(i: Identifier, state: Floats) -> None:
+    """Take an identifier that has diverged back to its start, and let it rest; the third time for good."""
+    i.ls[:] = i.ls_start
+    i.w[:] = i.w_start
+    state[at.DIVERGED] += 1.0
+    state[at.HELD] = at.HELD_TICKS if state[at.DIVERGED] < at.MOST_DIVERGED else math.inf
+
+
+@compiled
+def stop_at_zero(c: Compensator, state: Floats, row: Floats, header: np.ndarray, rows: Floats) -> float:
+    """Write the row of a tick that found a fault: zero volts, whatever the slew limit."""
+    c.limit_s[0] = 0.0
+    state[at.MODE] = row[at.ROW_STATE] = _FAULT
+    row[at.ROW_VOLTAGE] = row[at.ROW_FEEDFORWARD] = row[at.ROW_FEEDBACK] = 0.0
+    push(header, rows, row)
+    return 0.0
+
+
+@compiled
+def tick_kernel(
+    plan: Floats, i: Identifier, c: Compensator, settings: Floats, state: Floats, row: Floats,
+    header: np.ndarray, rows: Floats,
+) -> float:  # fmt: skip
+    """One tick; `row` comes with time, position and timing filled in. Returns the command (V).
+
+    A sample that is not new (status other than 0, or one that was seen before) is no measurement: the axis
+    is taken to have moved as the reference did, so that feedback neither kicks nor stops, and nothing is
+    learned until enough good samples have come in a row. Before the first good sample nothing goes out.
+    """
+    position = row[at.ROW_POSITION]
+    row[at.ROW_REFERENCE] = plan[at.REFERENCE]
+    row[at.ROW_LEARNING] = 0.0
+    fresh = row[at.ROW_STATUS] == 0.0
+    if fresh and not is_new(state, row):
+        row[at.ROW_STATUS] = STALE_STATUS
+        fresh = False
+    if not fresh and state[at.STARTED] > 0.0:
+        position = state[at.X1] + plan[at.REFERENCE] - state[at.LAST_REFERENCE]
+    closed = settings[at.CLOSED] > 0.0
+    gap = state[at.SINCE] > 0.0
+    state[at.FAULT] = check(settings, state, row, header, position, fresh)
+    if not math.isfinite(plan[at.REFERENCE]):
+        state[at.FAULT] = at.COMMAND
+    if state[at.FAULT] != at.OK:
+        return stop_at_zero(c, state, row, header, rows)
+    if state[at.STARTED] == 0.0:
+        if not fresh and closed:
+            row[at.ROW_STATE] = state[at.MODE]
+            row[at.ROW_VOLTAGE] = row[at.ROW_FEEDFORWARD] = row[at.ROW_FEEDBACK] = 0.0
+            push(header, rows, row)
+            return 0.0
+        state[at.STARTED] = 1.0
+        state[at.MODE] = _RUNNING
+        settle(i.sections, i.position_memory, position)
+        state[at.LEARNED_AT] = position
+    if fresh and row[at.ROW_OVERRUN] == 0.0:
+        # The commands around the last sample are known to have acted as they were timed.
+        if state[at.GOOD] >= 2.0 + settings[at.DELAY]:
+            identify(i, settings, state, plan[at.KNOWN], plan[at.LEARN], row)
+        state[at.GOOD] += 1.0
+    else:
+        state[at.GOOD] = 0.0
+    # Where the device sets the pace, a tick is late when its sample did not come, not when the host was.
+    late = (not fresh) if settings[at.DEVICE_PACED] > 0.0 else row[at.ROW_LATENESS] > settings[at.LATE_US]
+    keep_pace(state, 1 if late else 0)
+    row[at.ROW_STATE] = state[at.MODE]
+    state[at.X2] = state[at.X1]
+    state[at.X1] = position
+    state[at.LAST_REFERENCE] = plan[at.REFERENCE]
+
+    # The compensator's memory follows the reference also while its share is nothing.
+    call_basis(i.basis, i.bp.ctypes.data, c.bs.ctypes.data, c.x.ctypes.data, plan[at.LEAD_POSITION])
+    lead = 0.0
+    for j in range(i.w.size):
+        lead += i.w[j] * c.x[j]
+    if not abs(lead) < settings[at.FORCE_BOUND]:
+        put_aside(i, state)
+        degrade(state)
+        row[at.ROW_STATE] = state[at.MODE]
+    if state[at.SHARE] == 0.0 and state[at.HANDED] != 0.0 and c.pid_p[KI] > 0.0:
+        # Feedforward goes off at once and without a jump: the integral takes over what it gave.
+        most = c.pid_p[INTEGRAL_LIMIT]
+        c.pid_s[INTEGRAL] = min(max(c.pid_s[INTEGRAL] + state[at.HANDED], -most), most)
+    feedback = plan[at.VOLTS]
+    if closed:
+        error = plan[at.REFERENCE] - position
+        if gap and fresh:  # a derivative across what was not measured would be a kick
+            c.pid_s[LAST_INPUT] = -position if c.pid_p[ON_MEASUREMENT] == 1.0 else error
+        feedback = pid_step(c.pid_p, c.pid_s, error, position, state[at.EXCESS])
+    feedforward = 0.0
+    share = plan[at.FEEDFORWARD] * state[at.SHARE]
+    if share > 0.0:
+        feedforward = share * (plan[at.LEAD_FORCE] + lead) / settings[at.FORCE_CONSTANT]
+    state[at.HANDED] = feedforward
+    asked = feedback + feedforward
+    volts = limit_step(c.limit_p, c.limit_s, asked)
+    row[at.ROW_FEEDFORWARD] = feedforward
+    row[at.ROW_FEEDBACK] = feedback
+    if c.limit_s[FLAGS] == NO_NUMBER:
+        state[at.FAULT] = at.COMMAND
+        return stop_at_zero(c, state, row, header, rows)
+    state[at.EXCESS] = volts - asked
+
+    for j in range(int(settings[at.DELAY]) + 1, 0, -1):
+        state[at.HISTORY + j] = state[at.HISTORY + j - 1]
+    state[at.HISTORY] = volts
+    row[at.ROW_VOLTAGE] = volts
+    for j in range(i.w.size):
+        row[_COLUMNS + j] = i.w[j]
+    push(header, rows, row)
+    return volts
+
+
+@compiled
+def lost_kernel(
+    plan: Floats, settings: Floats, row: Floats, state: Floats, header: np.ndarray, rows: Floats
+) -> None:
+    """Account for a slot that was missed altogether: the last command held, the position unknown."""
+    row[at.ROW_REFERENCE] = plan[at.REFERENCE]
+    row[at.ROW_LEARNING] = 0.0
+    lose_slot(settings, state)
+    # What came before the gap is no neighbour of what comes after it.
+    state[at.GOOD] = 0.0
+    state[at.SINCE] += 1.0
+    state[at.X1] += plan[at.REFERENCE] - state[at.LAST_REFERENCE]
+    state[at.LAST_REFERENCE] = plan[at.REFERENCE]
+    row[at.ROW_STATE] = state[at.MODE]
+    push(header, rows, row)

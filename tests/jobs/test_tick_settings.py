@@ -1,0 +1,46 @@
+"""What a configuration's limits become in the tick."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from rtcomp.errors import ConfigError
+from rtcomp.jobs.configuration import RunFile
+from rtcomp.jobs.tick_settings import tick_settings
+from rtcomp.stage.schema import RUN_SECTIONS, StageFile
+
+
+def test_a_stage_file_leaves_out_every_section_of_a_run():
+    assert set(RunFile.model_fields) == {*StageFile.model_fields, *RUN_SECTIONS}
+
+
+def test_in_open_loop_nothing_is_held_against_positions_that_were_measured_long_ago(leuven):
+    s = tick_settings(leuven.changed(limits={"age": 0.01, "jump": 1e-6, "stuck": 0.1}), 0, False)
+    assert s.travel == (-math.inf, math.inf)
+    assert {s.speed, s.jump, s.stuck_volts, s.sign_volts, s.age_ticks, s.slots_lost} == {math.inf}
+
+
+def test_whether_the_axis_follows_is_checked_on_real_devices_and_where_it_is_asked_for(leuven):
+    off = tick_settings(leuven, 0, True)
+    assert {off.stuck_volts, off.sign_volts, off.stuck_ticks} == {math.inf}
+    asked = tick_settings(leuven.changed(limits={"stuck": 0.1, "voltage": 4.0}), 0, True)
+    assert asked.stuck_volts == asked.sign_volts == pytest.approx(3.92) and asked.stuck_ticks == 100
+    real = tick_settings(leuven.changed(device={"driver": "serial", "port": "/dev/null"}), 1, True)
+    assert real.stuck_ticks == 250 and real.stuck_volts == pytest.approx(9.8) and real.sign_ticks == 8
+    assert real.one_count == pytest.approx(10e-9 + 6 * 15e-9)
+
+
+def test_times_become_ticks_of_the_rate(leuven):
+    fast = tick_settings(leuven.changed(rate=10_000.0, limits={"age": 0.05, "invalid": 0.01}), 0, True)
+    assert (fast.age_ticks, fast.invalid_ticks, fast.sign_ticks) == (500, 100, 50)
+    usual = tick_settings(leuven, 0, True)
+    assert (usual.age_ticks, usual.invalid_ticks, usual.slots_lost) == (100, 0, 20)
+    paced = tick_settings(leuven.changed(loop={"overrun": "device-paced", "slots_lost": 3}), 0, True)
+    assert paced.device_paced and paced.slots_lost == 3
+
+
+def test_limits_that_contradict_each_other_are_refused(leuven):
+    with pytest.raises(ConfigError, match=r"limits.moves_at: 3 V is more than limits.voltage \(2 V\)"):
+        leuven.changed(limits={"voltage": 2.0, "moves_at": 3.0})

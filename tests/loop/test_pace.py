@@ -1,0 +1,162 @@
+"""Missed deadlines in virtual time: counted, degraded, a fault; the same arithmetic as on a wall clock."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from loop_rig import WEIGHTS, LateClock, device, go, plan, stage, tick
+
+from rtcomp.errors import DeviceError
+from rtcomp.loop import layout as at
+from rtcomp.loop.pace import keep_pace, lose_slot
+from rtcomp.loop.states import Machine, State
+
+TICKS = 900
+LATE = 0.6e-3
+RIGHT = np.append(WEIGHTS, 0.0)
+RUNNING, DEGRADED = float(State.RUNNING), float(State.DEGRADED)
+
+
+def compensated(late, ticks=TICKS, **limits):
+    return go(
+        device(stage()), tick(weights=RIGHT, **limits), plan(ticks, learn=False, share=1.0), LateClock(late)
+    )
+
+
+def degraded(left):
+    return np.flatnonzero(left.column("state") == DEGRADED)
+
+
+def test_one_late_tick_is_counted_and_changes_nothing_else():
+    quiet, late = compensated({}), compensated({300: LATE})
+    assert late.outcome.late == 1 and late.outcome.degraded == 0
+    assert np.array_equal(late.column("voltage"), quiet.column("voltage"))
+    assert not late.column("learning").any()
+    learning = go(device(stage()), tick(), plan(TICKS), LateClock({300: LATE}))
+    assert not learning.column("learning")[300] and learning.column("learning")[298]
+
+
+@pytest.mark.parametrize(
+    ("late", "first"),
+    [
+        ({300: LATE, 301: LATE, 302: LATE}, 302),
+        (dict.fromkeys(range(300, 332, 4), LATE), 328),
+        ({300: 1.0e-3}, 300),
+    ],
+    ids=["three in a row", "eight of 32", "a slot lost"],
+)
+def test_what_degrades_and_for_how_long(late, first):
+    left = compensated(late)
+    last = max(late) + (1 if first == 300 else 0)  # the tick that is served after a lost slot is in time
+    rows = degraded(left)
+    assert rows[0] == first and left.outcome.degraded == 1
+    # 32 clean ticks: the 32nd is running again.
+    assert rows[-1] == last + (30 if first == 300 else 31) and len(rows) == rows[-1] - first + 1
+    served = rows[left.column("overrun")[rows] != 2]
+    assert not left.column("feedforward")[served].any()
+    assert left.column("feedback")[served].any()
+
+
+@pytest.mark.parametrize(
+    "late",
+    [{300: LATE, 301: LATE, 303: LATE, 304: LATE}, dict.fromkeys(range(300, 600, 5), LATE), {300: 0.99e-3}],
+    ids=["two in a row, twice", "six or seven of 32", "nearly a slot"],
+)
+def test_what_does_not_degrade(late):
+    left = compensated(late)
+    assert left.outcome.degraded == 0 and not len(degraded(left))
+
+
+def test_feedforward_goes_and_comes_back_without_a_jump():
+    late = {400: LATE, 401: LATE, 402: LATE}
+    quiet, left = compensated({}, 1800), compensated(late, 1800)
+    steps, usual = np.abs(np.diff(left.column("voltage"))), np.abs(np.diff(quiet.column("voltage"))).max()
+    feedforward = np.abs(quiet.column("feedforward")[380:460]).max()
+    assert feedforward > 10 * usual  # cut off, it would have jumped by so much
+    assert steps[395:].max() < 3 * usual
+    back = left.column("feedforward")[434 : 434 + 140] / quiet.column("feedforward")[434 : 434 + 140]
+    assert (
+        np.all(np.diff(back) > -1e-9) and back[0] == pytest.approx(at.FADE) and back[-1] == pytest.approx(1.0)
+    )
+    error = np.abs(left.column("reference") - left.column("position"))
+    usual = np.abs(quiet.column("reference") - quiet.column("position"))
+    assert error[1500:].max() < 2 * usual[1500:].max()
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_too_many_slots_lost_is_a_latched_fault_at_zero_volts(at_once):
+    late = {300: 20.3e-3} if at_once else {300 + 40 * k: 5.3e-3 for k in range(5)}
+    noting, machine = device(stage()), Machine()
+    left = go(noting, tick(slots_lost=20), plan(TICKS), LateClock(late), error=DeviceError, machine=machine)
+    assert "20 slots lost at tick" in str(left.outcome) and "rtcomp doctor" in str(left.outcome)
+    assert machine.state is State.FAULT and machine.why == str(left.outcome)
+    assert noting.commands[-1] == 0.0 and noting.calls[-1] == ("close", 0.0)
+    assert np.count_nonzero(left.column("overrun") == 2) == (20 if at_once else 25)
+    assert left.column("state")[-1] == State.FAULT
+
+
+def test_one_slot_in_a_hundred_may_be_lost_for_ever():
+    rare = {50 + 110 * k: 1.2e-3 for k in range(60)}
+    left = go(device(stage()), tick(slots_lost=20), plan(7000), LateClock(rare))
+    assert left.outcome.lost == 60 and left.outcome.stopped_by == "end"
+    often = {50 + 50 * k: 1.2e-3 for k in range(60)}
+    left = go(device(stage()), tick(slots_lost=20), plan(7000), LateClock(often), error=DeviceError)
+    assert 20 <= np.count_nonzero(left.column("overrun") == 2) <= 45
+
+
+def test_where_the_device_sets_the_pace_only_samples_that_do_not_come_are_late():
+    late = dict.fromkeys(range(300, 320), LATE)
+    left = compensated(late, device_paced=True)
+    assert left.outcome.late == 20 and left.outcome.degraded == 0
+    stale = {k: (lambda s: s._replace(status=1)) for k in (300, 301, 302)}
+    left = go(
+        device(stage(), wrong=stale),
+        tick(weights=RIGHT, device_paced=True),
+        plan(TICKS, share=1.0, learn=False),
+    )
+    assert degraded(left)[0] == 302 and left.outcome.degraded == 1
+    host = go(device(stage(), wrong=stale), tick(weights=RIGHT), plan(TICKS, share=1.0, learn=False))
+    assert host.outcome.degraded == 0
+
+
+class Written:
+    """The policy as the page says it, with lists."""
+
+    def __init__(self, most):
+        self.history, self.lost, self.most = [], 0.0, most
+        self.mode, self.fault = State.RUNNING, False
+
+    def slot(self, late, lost):
+        self.history.append(late or lost)
+        if lost:
+            self.lost += 1.0
+            self.fault |= self.lost >= self.most
+        elif not late:
+            self.lost = max(0.0, self.lost - at.FORGIVE)
+        recent = self.history[-32:]
+        if lost or (all(self.history[-3:]) and len(self.history) >= 3) or sum(recent) >= 8:
+            self.mode = State.DEGRADED
+        elif self.mode is State.DEGRADED and len(recent) == 32 and not any(recent):
+            self.mode = State.RUNNING
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.sampled_from("....l.x"), min_size=1, max_size=300), st.sampled_from([5, 20]))
+def test_the_pace_is_the_one_written_down(slots, most):
+    state, limits = np.zeros(at.HISTORY), np.zeros(at.FORCE_BOUND + 1)
+    state[at.MODE], state[at.SHARE], limits[at.SLOTS_LOST] = RUNNING, 1.0, most
+    written = Written(most)
+    for slot in slots:
+        written.slot(slot == "l", slot == "x")
+        if slot == "x":
+            lose_slot(limits, state)
+        else:
+            keep_pace(state, int(slot == "l"))
+        assert (state[at.FAULT] != 0) == written.fault
+        assert state[at.MODE] == (State.FAULT if written.fault else written.mode)
+        if written.fault:
+            return
+        assert (state[at.SHARE] == 0.0) or state[at.MODE] == RUNNING
+        assert state[at.LATE_SUM] == sum(written.history[-32:])
