@@ -21,7 +21,7 @@ from rtcomp.loop.ring import Ring
 from rtcomp.loop.tick import COLUMNS, Compensator, Identifier, Tick, lost_kernel, tick_kernel
 
 BLOCK = 100_000
-"""Rows of a plan asked for at a time: a run of up to this many ticks never computes references on the way."""
+"""Rows of a plan asked for at a time in virtual time; on a wall clock all of them are there before tick 0."""
 
 
 class Plan(Protocol):
@@ -130,13 +130,14 @@ def run(
     ended = 2
     warm_up(tick)
     try:
+        # References of 100,000 ticks take tens of milliseconds: between two deadlines that is slots lost.
+        first, last = 0, min(BLOCK, plan.ticks) if virtual else plan.ticks
+        block = plan.rows(first, last)
         device.open()
         began = time.perf_counter()
         clock.start(period)
         volts = 0.0
         shown = began
-        first = last = 0
-        block = np.zeros((0, t.PLAN_WIDTH))
         while done < plan.ticks:
             if done == last:
                 first, last = done, min(done + BLOCK, plan.ticks)
