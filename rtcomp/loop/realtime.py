@@ -6,7 +6,8 @@ import contextlib
 import ctypes
 import gc
 import os
-from collections.abc import Iterator
+import socket
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 PRIORITY = 80
@@ -23,10 +24,9 @@ _UNKNOWN = "unknown"
 def realtime_process(priority: int = PRIORITY) -> Iterator[dict[str, str]]:
     """Ask for all that deadlines hang on and that a process can ask for; put it back on the way out.
 
-    SCHED_FIFO of `priority`, not inherited by children; where that is refused, timers without slack; the last
-    of the cores that the machine keeps for this, where it keeps any; locked memory; processors that do not
-    fall into deep sleep; no garbage collection. Without isolated cores the process stays where it may run:
-    a program that another one pins (``taskset``) keeps its cores.
+    SCHED_FIFO of `priority`, not inherited by children; where that is refused, timers without slack; a core
+    of its own (`cores_to_take`) that no other loop of this machine has taken; locked memory; processors that
+    do not fall into deep sleep; no garbage collection.
 
     Nothing of it is required: the yielded dictionary says what the system granted, read back (`in_force`), so
     that it can be recorded.
@@ -34,16 +34,22 @@ def realtime_process(priority: int = PRIORITY) -> Iterator[dict[str, str]]:
     with contextlib.ExitStack() as stack:
         stack.enter_context(_no_collection())
         stack.enter_context(_awake())
-        stack.enter_context(_on_core(isolated_core(_text(ISOLATED))))
+        stack.enter_context(_on_core_of_its_own())
         stack.enter_context(_scheduled(priority))
         stack.enter_context(_locked_memory())
         yield in_force()
 
 
-def isolated_core(listed: str) -> int | None:
-    """Return the last core in the kernel's list (``2-3,6``) of isolated ones; None where it is empty."""
-    last = listed.replace("-", ",").split(",")[-1]
-    return int(last) if last.isdigit() else None
+def cores_to_take(isolated: str, allowed: Collection[int]) -> list[int]:
+    """Return the cores to pin a loop to, best first.
+
+    Those that the machine keeps for such (`isolated`, the kernel's list: ``2-3,6``), last first; where it
+    keeps none, those that this process may run on but for the first, where interrupts mostly go. None where
+    it may run on a single one, or has been given one by ``taskset``.
+    """
+    ends = [part.split("-") for part in isolated.split(",") if part]
+    kept = {core for end in ends for core in range(int(end[0]), int(end[-1]) + 1)}
+    return sorted(kept or sorted(allowed)[1:], reverse=True)
 
 
 @contextlib.contextmanager
@@ -75,17 +81,27 @@ def _awake() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _on_core(core: int | None) -> Iterator[None]:
-    if core is None or not hasattr(os, "sched_setaffinity"):
+def _on_core_of_its_own() -> Iterator[None]:
+    """Pin the process: one that is moved between cores leaves its cache behind, and is late for it.
+
+    Two loops of one priority on one core would wait for each other. A core is taken by a socket's name, which
+    the kernel gives back when the process ends, however it does.
+    """
+    if not hasattr(os, "sched_setaffinity"):
         yield
         return
     before = os.sched_getaffinity(0)
-    with contextlib.suppress(OSError):  # a container that does not own the core
-        os.sched_setaffinity(0, {core})
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, before)
+    with contextlib.ExitStack() as stack:
+        for core in cores_to_take(_text(ISOLATED), before):
+            taken = stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
+            with contextlib.suppress(OSError):  # another loop's, or not this container's to give
+                taken.bind(f"\0rtcomp-loop-on-core-{core}")
+                os.sched_setaffinity(0, {core})
+                break
+        try:
+            yield
+        finally:
+            os.sched_setaffinity(0, before)
 
 
 @contextlib.contextmanager

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtcomp.loop import realtime
-from rtcomp.loop.realtime import in_force, isolated_core, realtime_process, timer_slack_ns
+from rtcomp.loop.realtime import cores_to_take, in_force, realtime_process, timer_slack_ns
 
 
 def locked_kb():
@@ -27,7 +27,6 @@ def everything():
         os.sched_getparam(0).sched_priority,
         os.sched_getaffinity(0),
         timer_slack_ns(),
-        in_force()["wake_up_latency"],
         gc.isenabled(),
         gc.get_freeze_count(),
     )
@@ -89,45 +88,73 @@ def test_every_text_fits_its_place_in_a_recording():
         assert all(0 < len(text.encode()) <= TEXT_BYTES for text in found.values())
 
 
-@given(st.sets(st.integers(0, 200), min_size=1))
-def test_the_last_isolated_core_is_taken_however_the_list_is_written(isolated):
-    """As the kernel writes it: neighbours joined, 0-2,5."""
+def as_the_kernel_writes(numbers):
+    """Neighbours joined: 0-2,5."""
     runs = []
-    for core in sorted(isolated):
-        if runs and core == runs[-1][1] + 1:
-            runs[-1][1] = core
+    for number in sorted(numbers):
+        if runs and number == runs[-1][1] + 1:
+            runs[-1][1] = number
         else:
-            runs.append([core, core])
-    listed = ",".join(f"{a}-{b}" if b > a else f"{a}" for a, b in runs)
-    assert isolated_core(listed) == max(isolated)
+            runs.append([number, number])
+    return ",".join(f"{a}-{b}" if b > a else f"{a}" for a, b in runs)
 
 
-def test_without_isolated_cores_none_is_taken():
-    assert isolated_core("") is None
+@given(st.sets(st.integers(0, 200), min_size=1), st.sets(st.integers(0, 200), min_size=1))
+def test_isolated_cores_are_taken_last_first(isolated, allowed):
+    assert cores_to_take(as_the_kernel_writes(isolated), allowed) == sorted(isolated, reverse=True)
+
+
+@given(st.sets(st.integers(0, 200), min_size=1))
+def test_without_isolated_cores_the_first_is_left_to_others(allowed):
+    assert cores_to_take("", allowed) == sorted(allowed - {min(allowed)}, reverse=True)
+
+
+def told(cores, tmp_path, monkeypatch):
+    """A machine that keeps these cores for loops."""
+    file = tmp_path / "isolated"
+    file.write_text(f"{cores}\n")
+    monkeypatch.setattr(realtime, "ISOLATED", file)
+
+
+def test_a_core_of_its_own_is_the_only_one_while_it_lasts(tmp_path, monkeypatch):
     before = os.sched_getaffinity(0)
-    if not realtime.ISOLATED.exists() or not realtime.ISOLATED.read_text().strip():
-        with realtime_process():
-            assert os.sched_getaffinity(0) == before
-
-
-def test_an_isolated_core_is_the_only_one_while_it_lasts(tmp_path, monkeypatch):
-    """A machine that keeps its last core for this, as the kernel tells it."""
-    before = os.sched_getaffinity(0)
-    told = tmp_path / "isolated"
-    told.write_text(f"{max(before)}\n")
-    monkeypatch.setattr(realtime, "ISOLATED", told)
-    with realtime_process() as found:
-        assert os.sched_getaffinity(0) == {max(before)} and found["cores"] == str(max(before))
-    assert os.sched_getaffinity(0) == before
+    told(max(before), tmp_path, monkeypatch)
+    for _ in range(2):  # it is given back
+        with realtime_process() as found:
+            assert os.sched_getaffinity(0) == {max(before)} and found["cores"] == str(max(before))
+        assert os.sched_getaffinity(0) == before
 
 
 def test_a_core_that_is_not_there_is_not_taken(tmp_path, monkeypatch):
     before = os.sched_getaffinity(0)
-    told = tmp_path / "isolated"
-    told.write_text("4095\n")
-    monkeypatch.setattr(realtime, "ISOLATED", told)
+    told("4095", tmp_path, monkeypatch)
     with realtime_process():
         assert os.sched_getaffinity(0) == before
+
+
+def test_no_two_loops_share_a_core_of_their_own(tmp_path, monkeypatch):
+    """The other has it until it is killed."""
+    before = os.sched_getaffinity(0)
+    told(max(before), tmp_path, monkeypatch)
+    script = (
+        "import sys, time\n"
+        "from pathlib import Path\n"
+        "from rtcomp.loop import realtime\n"
+        f"realtime.ISOLATED = Path({str(realtime.ISOLATED)!r})\n"
+        "with realtime.realtime_process() as found:\n"
+        "    print(found['cores'], flush=True)\n"
+        "    time.sleep(60)\n"
+    )
+    other = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    try:
+        assert other.stdout.readline() == f"{max(before)}\n"
+        with realtime_process() as found:
+            assert os.sched_getaffinity(0) == before and cores(found["cores"]) == before
+    finally:
+        other.kill()
+        other.communicate()
+    with realtime_process():
+        assert os.sched_getaffinity(0) == {max(before)}
 
 
 def test_children_do_not_inherit_the_class():
