@@ -113,7 +113,7 @@ def measure(
     taken = np.zeros((pairs, 2), np.int64)
     clock, now = WallClock(), time.perf_counter_ns
     with realtime_process(priority) as realtime, _Both(settings, Bench(period=period)) as device:
-        device.exchange(0.0)
+        device.arm()
         by_hand = device.by_hand(2 * pairs)
         due = 0
         clock.start(period)
