@@ -57,6 +57,8 @@ class Seen:
     """s from the last command that the device acted on to zero output, by the plant's clock."""
     after_signal: list[float] = field(default_factory=list)
     """s from the signal to zero output, by the machine's clock."""
+    already: int = 0
+    """Moments at which the watchdog had bitten before: the machine had kept the loop for longer than that."""
     refused: int = 0
     """New hosts that found the latched fault and went no further."""
     disarmed: int = 0
@@ -102,8 +104,10 @@ def host(config: Configuration) -> int:
     return 0
 
 
-def one(config: Configuration, number: int, moment: float, seen: Seen) -> float:
-    """Signal a running loop at `moment` (s), look at the device afterwards; return when it was sent."""
+def one(config: Configuration, number: int, moment: float, seen: Seen) -> tuple[float, float]:
+    """Signal a running loop at `moment` (s), look at the device afterwards; return when it began and when
+    the signal was sent (s, monotonic)."""
+    began = time.monotonic()
     pid = begin(config)
     time.sleep(moment)
     os.kill(pid, number)
@@ -119,7 +123,7 @@ def one(config: Configuration, number: int, moment: float, seen: Seen) -> float:
         seen.went_on += status == 2
         time.sleep(SETTLE_S)
     look_again(config, seen)
-    return sent
+    return began, sent
 
 
 def look_again(config: Configuration, seen: Seen) -> None:
@@ -175,18 +179,28 @@ def link(config: Configuration, program: Path | None, number: int, moments: int,
         )
         if program is not None:
             on_time(plant.pid)
-        sent = [one(config, number, draw.uniform(0.0, LONGEST_S), seen) for _ in range(moments)]
+        times = [one(config, number, draw.uniform(0.0, LONGEST_S), seen) for _ in range(moments)]
         account = plant.stop()
-    for zeroing in account["zeroings"]:
-        if zeroing.get("cause", "watchdog") != "watchdog":
-            continue
-        silent = zeroing.get("since_command", zeroing.get("since_asked"))
-        at = account["started_monotonic_s"] + zeroing["time"] + zeroing.get("noticed_after", 0.0)
-        before = [moment for moment in sent if moment <= at]
-        if before and at - before[-1] < WATCHDOG_S + 0.5 * SETTLE_S:
-            seen.since_command.append(silent)
-            seen.after_signal.append(at - before[-1])
+    began = account["started_monotonic_s"]
+    zeroings = [
+        (began + z["time"] + z.get("noticed_after", 0.0), z.get("since_command", z.get("since_asked")))
+        for z in account["zeroings"]
+        if z.get("cause", "watchdog") == "watchdog"
+    ]
+    tell(seen, times, zeroings)
     return seen
+
+
+def tell(seen: Seen, times: list[tuple[float, float]], zeroings: list[tuple[float, float]]) -> None:
+    """Find for each run, (began, signalled), how its output went to zero, of (when, s since last command)."""
+    for number, (began, sent) in enumerate(times):
+        end = times[number + 1][0] if number + 1 < len(times) else float("inf")
+        mine = [(at, silent) for at, silent in zeroings if began <= at < end]
+        if mine:
+            at, silent = mine[-1]
+            seen.since_command.append(silent)
+            seen.after_signal.append(max(0.0, at - sent))
+            seen.already += at < sent
 
 
 def on_time(pid: int) -> None:
@@ -202,14 +216,17 @@ def figures_of(seen: Seen, who: str) -> list[Figure]:
     worst = 1e3 * max(seen.since_command, default=float("inf"))
     sent = 1e3 * max(seen.after_signal, default=float("inf"))
     return [
-        Figure(f"{who}: zeroed by the watchdog", float(len(seen.since_command)), of, every),
+        Figure(
+            f"{who}: zeroed by the watchdog", float(len(seen.since_command)), of, every,
+            f"{seen.already} before the signal: the machine had stalled" if seen.already else "",
+        ),
         Figure(f"{who}: zero after the last command, worst", worst, "ms", f"<= {ms + 1:g}"),
         Figure(f"{who}: zero after the signal, worst", sent, "ms", "", "as processes were run"),
         Figure(f"{who}: a new host is refused", float(seen.refused), of, every),
         Figure(f"{who}: DISARMED once cleared", float(seen.disarmed), of, every),
         Figure(f"{who}: output when armed again, most", max(seen.output), "V", "<= 0"),
         Figure(f"{who}: moved by arming again, most", 1e9 * max(seen.moved), "nm", "<= 100", "noise: 15 nm"),
-    ]
+    ]  # fmt: skip
 
 
 @click.command()

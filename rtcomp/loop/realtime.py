@@ -43,9 +43,9 @@ def realtime_process(priority: int = PRIORITY) -> Iterator[dict[str, str]]:
 def cores_to_take(isolated: str, allowed: Collection[int]) -> list[int]:
     """Return the cores to pin a loop to, best first.
 
-    Those that the machine keeps for such (`isolated`, the kernel's list: ``2-3,6``), last first; where it
-    keeps none, those that this process may run on but for the first, where interrupts mostly go. None where
-    it may run on a single one, or has been given one by ``taskset``.
+    Those that the machine keeps for such (`isolated`, the kernel's list: ``2-3,6``), last first. Where it
+    keeps none, those that this process may run on but for the first, where interrupts mostly go: none at all
+    for one that may run on a single core, as ``taskset`` may have said.
     """
     ends = [part.split("-") for part in isolated.split(",") if part]
     kept = {core for end in ends for core in range(int(end[0]), int(end[-1]) + 1)}
