@@ -171,6 +171,8 @@ def main(hours: float, wall: float, path: Path | None, child: str | None) -> Non
     if child is not None:
         rate, port, folder, seconds = json.loads(child)
         config = load(file, port=port).changed(rate=rate)
+        if port is not None:  # a machine that stalls for longer than a board would wait shall not end it
+            config = config.changed(device={**config.run.device, "watchdog": 5.0})
         print(json.dumps(endure(config, Path(folder), seconds)))
         return
     figures: list[Figure] = []

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import bench_endurance
+import bench_fuzz
 import bench_lateness
 import bench_roundtrip
 import bench_watchdog
@@ -13,6 +14,7 @@ import h5py
 import numpy as np
 import pytest
 from bench_kill import ring_of
+from rtcomp_drivers import protocol
 
 from rtcomp.bench.link import RoundTrips
 from rtcomp.bench.loop import AtRate, Measured
@@ -121,6 +123,14 @@ def test_a_recording_is_whole_only_with_every_row_in_place(
     assert bench_endurance.complete(recording(tmp_path / "d.h5", time), 500.0, 1000) == 0.999
     shifted = np.delete(np.arange(1001) / 500.0, 900)  # a row lost, the count made up at the end
     assert bench_endurance.complete(recording(tmp_path / "e.h5", shifted), 500.0, 1000) == 0.9
+
+
+def test_a_codec_without_its_check_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The fuzz can fail: with any CRC taken for right, bad frames come in."""
+    assert bench_fuzz.fuzz(100_000, 3)[2] == 0
+    unchecked = lambda piece: (protocol.unstuff(piece) or b"")[:-4] or None  # noqa: E731
+    monkeypatch.setattr(protocol, "payload_of", unchecked)
+    assert bench_fuzz.fuzz(100_000, 3)[2] > 0
 
 
 def test_the_ring_of_a_loop_is_not_the_one_that_it_warms_up_on() -> None:

@@ -114,6 +114,12 @@ def test_a_killed_run_keeps_its_file(tmp_path: Path) -> None:
         assert found[f"{who} killed: files that open"]["value"] == 1.0
 
 
+def test_damage_into_the_hosts_end(tmp_path: Path) -> None:
+    found = figures(tmp_path, "bench_fuzz.py", "--bytes", 200_000)
+    assert found["bad ones among them"]["value"] == 0.0
+    assert found["messages accepted"]["value"] > 500
+
+
 @pytest.mark.slow
 def test_lateness_beside_its_rivals(tmp_path: Path) -> None:
     found = figures(tmp_path, "bench_lateness.py", "--seconds", 0.5, "--rate", 500, "--rate", 1000)
