@@ -102,7 +102,6 @@ def measure(
     Each way is paced at `rate_hz`, by the loop's clock. `progress(done 0 to 1)` is called once a second.
     Raises DeviceError where the board cannot be had or is lost.
     """
-    period = 0.5 / rate_hz
     pairs = LEFT_OUT + max(1, round(rate_hz * seconds))
     settings = SerialSettings.model_validate(
         {
@@ -110,28 +109,48 @@ def measure(
             "reply_timeout": _PATIENCE_S,
         }
     )  # fmt: skip
-    taken = np.zeros((pairs, 2), np.int64)
-    clock, now = WallClock(), time.perf_counter_ns
-    with realtime_process(priority) as realtime, _Both(settings, Bench(period=period)) as device:
+    bench = Bench(period=0.5 / rate_hz)
+    with realtime_process(priority) as realtime, _Both(settings, bench) as device:
         device.arm()
         by_hand = device.by_hand(2 * pairs)
-        due = 0
-        clock.start(period)
-        for pair in range(pairs):
-            if progress is not None and not pair % max(1, round(rate_hz)):
-                progress(pair / pairs)
-            late = clock.wait(due)
-            began = now()
-            device.exchange(0.0)
-            taken[pair, 0] = now() - began
-            due += 1 + int(late / period)  # a slot that has passed is not caught up
-            late = clock.wait(due)
-            began = now()
-            by_hand()
-            taken[pair, 1] = now() - began
-            device.count_one()
-            due += 1 + int(late / period)
+        driver, raw = by_turns(
+            lambda: device.exchange(0.0), by_hand, rate_hz, pairs, after=device.count_one, progress=progress
+        )
+    return RoundTrips(rate_hz, driver, raw, dict(device.counters), realtime)
+
+
+def by_turns(
+    ours: Callable[[], object],
+    theirs: Callable[[], object],
+    rate_hz: float,
+    pairs: int,
+    *,
+    after: Callable[[], None] = lambda: None,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[Spread, Spread]:
+    """Call `ours`, then `theirs`, `pairs` times, each at `rate_hz`; return how long (us) they took.
+
+    For every kind of link: two ways to make one exchange. `after` is called, untimed, after each of `theirs`;
+    the first `LEFT_OUT` pairs do not count.
+    """
+    period = 0.5 / rate_hz
+    taken = np.zeros((pairs, 2), np.int64)
+    clock, now = WallClock(), time.perf_counter_ns
+    due = 0
+    clock.start(period)
+    for pair in range(pairs):
+        if progress is not None and not pair % max(1, round(rate_hz)):
+            progress(pair / pairs)
+        late = clock.wait(due)
+        began = now()
+        ours()
+        taken[pair, 0] = now() - began
+        due += 1 + int(late / period)  # a slot that has passed is not caught up
+        late = clock.wait(due)
+        began = now()
+        theirs()
+        taken[pair, 1] = now() - began
+        after()
+        due += 1 + int(late / period)
     times = 1e-3 * taken[LEFT_OUT:]
-    return RoundTrips(
-        rate_hz, Spread.of(times[:, 0]), Spread.of(times[:, 1]), dict(device.counters), realtime
-    )
+    return Spread.of(times[:, 0]), Spread.of(times[:, 1])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -31,6 +33,24 @@ def test_ticks_are_timed():
     told = found.to_json()
     assert told["ratios"]["numpy"] == pytest.approx(told["numpy_us"] / told["operator_us"])
     assert told["ratios"]["python"] > 1.0
+
+
+def test_two_ways_are_timed_by_turns_and_the_first_pairs_left_out():
+    calls = []
+
+    def ours():
+        calls.append("ours")
+
+    def theirs():
+        calls.append("theirs")
+        time.sleep(2e-3)
+
+    first, second = link.by_turns(
+        ours, theirs, 500.0, link.LEFT_OUT + 10, after=lambda: calls.append("after")
+    )
+    assert calls == ["ours", "theirs", "after"] * (link.LEFT_OUT + 10)
+    assert first.total == second.total == 10
+    assert second.values[0] >= 2000.0  # us; a sleep is never shorter
 
 
 def test_round_trips_of_both_ways_on_one_port():
