@@ -143,6 +143,7 @@ def loop(
 
 @bench.command()
 @click.option("--port", metavar="PORT", help="Of a board; it is armed, its output stays at 0 V.")
+@click.option("--armed", is_flag=True, help="The board on PORT may be armed; without it nothing is.")
 @click.option("--plant", is_flag=True, help="Start a plant server and use its port.")
 @_firmware
 @click.option(
@@ -154,6 +155,7 @@ def loop(
 @json_option
 def link(
     port: str | None,
+    armed: bool,
     plant: bool,
     firmware: Path | None,
     rate: float,
@@ -169,7 +171,7 @@ def link(
     \b
     Examples:
       rtcomp bench link --plant
-      rtcomp bench link --port /dev/ttyACM0 --rate 500 --seconds 30
+      rtcomp bench link --port /dev/ttyACM0 --armed --rate 500 --seconds 30
     """
     from rtcomp_drivers.plant_process import PlantProcess
 
@@ -179,6 +181,11 @@ def link(
 
     if (port is None) != plant:
         raise click.UsageError("give either --port PORT of a board or --plant")
+    if port is not None and not armed:
+        raise click.UsageError(
+            f"round trips need the board on {port} armed, though its output stays 0 V; see that its axis may "
+            "be held at that, then give --armed"
+        )
     if firmware is not None and not plant:
         raise click.UsageError("--firmware is for a plant; give --plant too")
     with contextlib.ExitStack() as stack:

@@ -65,8 +65,9 @@ def test_the_link_in_json(tmp_path: Path) -> None:
         (("loop", "--firmware", "board"), "give --serial too"),
         (("link",), "give either --port PORT of a board or --plant"),
         (("link", "--plant", "--port", "/dev/ttyACM0"), "give either --port PORT of a board or --plant"),
-        (("link", "--port", "/dev/null-modem"), "/dev/null-modem does not exist"),
-        (("link", "--port", "x", "--firmware", "board"), "give --plant too"),
+        (("link", "--port", "/dev/null-modem"), "then give --armed"),
+        (("link", "--port", "/dev/null-modem", "--armed"), "/dev/null-modem does not exist"),
+        (("link", "--port", "x", "--armed", "--firmware", "board"), "give --plant too"),
         (("tick", "--ticks", "10"), "1000<=x"),
         (("lop",), "lop"),
     ],
@@ -90,7 +91,7 @@ def test_every_example_is_accepted_as_written(what: str, tmp_path: Path) -> None
         words = example.split()
         if "--port" in words:
             at = words.index("--port")
-            words[at : at + 2] = ["--plant"]
+            words[at : at + 3] = ["--plant"]
         if "--seconds" in words:
             words[words.index("--seconds") + 1] = "0.5"
         elif what != "tick":
