@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import os
+import subprocess
+import sys
 from pathlib import Path
 
 import bench_endurance
@@ -19,7 +20,6 @@ from rtcomp_drivers import protocol
 from rtcomp.bench.link import RoundTrips
 from rtcomp.bench.loop import AtRate, Measured
 from rtcomp.bench.spread import Spread
-from rtcomp.loop.ring import Ring
 
 
 def at_rate(loop: list[float], cyclic: list[float] | None) -> AtRate:
@@ -134,17 +134,27 @@ def test_a_codec_without_its_check_is_found_out(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_the_ring_of_a_loop_is_not_the_one_that_it_warms_up_on() -> None:
-    scratch = Ring.create(2, 3)
-    scratch.header[3] = 4
+    script = (
+        "from rtcomp.loop.ring import Ring\n"
+        "scratch = Ring.create(2, 3)\n"
+        "scratch.header[3] = 4\n"
+        "input()\n"
+        "real = Ring.create(64, 3)\n"
+        "real.header[3] = 4\n"
+        "print('real', flush=True)\n"
+        "input()\n"
+    )
+    loop = subprocess.Popen(
+        [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert loop.stdin is not None and loop.stdout is not None
     try:
-        assert ring_of(os.getpid()) is None
-        real = Ring.create(64, 3)
-        real.header[3] = 4
-        try:
-            found = ring_of(os.getpid())
-            assert found is not None and found.capacity == 64
-            found.release()
-        finally:
-            real.release()
+        assert ring_of(loop.pid) is None
+        loop.stdin.write("\n")
+        loop.stdin.flush()
+        assert loop.stdout.readline() == "real\n"
+        found = ring_of(loop.pid)
+        assert found is not None and found.capacity == 64
+        found.release()
     finally:
-        scratch.release()
+        loop.communicate("\n", timeout=60)
