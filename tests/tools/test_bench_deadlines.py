@@ -138,6 +138,7 @@ def test_the_ring_of_a_loop_is_not_the_one_that_it_warms_up_on() -> None:
         "from rtcomp.loop.ring import Ring\n"
         "scratch = Ring.create(2, 3)\n"
         "scratch.header[3] = 4\n"
+        "print('scratch', flush=True)\n"
         "input()\n"
         "real = Ring.create(64, 3)\n"
         "real.header[3] = 4\n"
@@ -149,6 +150,7 @@ def test_the_ring_of_a_loop_is_not_the_one_that_it_warms_up_on() -> None:
     )
     assert loop.stdin is not None and loop.stdout is not None
     try:
+        assert loop.stdout.readline() == "scratch\n"
         assert ring_of(loop.pid) is None
         loop.stdin.write("\n")
         loop.stdin.flush()
