@@ -25,6 +25,9 @@ from figures_table import Figure, show
 from rtcomp.jobs.demo import shipped
 from rtcomp.loop.ring import Ring
 
+SCRATCH = 2
+"""Rows of the ring on which a loop warms up."""
+
 
 def children(pid: int) -> list[int]:
     text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
@@ -34,13 +37,17 @@ def children(pid: int) -> list[int]:
 def ring_of(pid: int) -> Ring | None:
     """Open the ring of a running loop through its process's descriptors."""
     for link in Path(f"/proc/{pid}/fd").iterdir():
+        descriptor = -1
         try:
             if "rtcomp-ring" in str(link.readlink()):
-                ring = Ring.attach(os.open(link, os.O_RDWR))
-                if ring.written:
+                descriptor = os.open(link, os.O_RDWR)
+                ring = Ring.attach(descriptor)
+                if ring.written and ring.capacity > SCRATCH:
                     return ring
-        except (OSError, ValueError):
-            continue
+        except (OSError, ValueError):  # closed meanwhile, or not yet a ring
+            pass
+        if descriptor >= 0:
+            os.close(descriptor)
     return None
 
 

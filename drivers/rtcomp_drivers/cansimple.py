@@ -101,6 +101,10 @@ class Heartbeat(NamedTuple):
     """Whether a trajectory has reached its end."""
 
 
+STAND_IN = (0, 0, 0)
+"""Hardware version of a simulated axis: no product has it."""
+
+
 class Version(NamedTuple):
     """Answer to VERSION."""
 

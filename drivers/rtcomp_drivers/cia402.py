@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rtcomp.errors import ConfigError, DeviceBusyError, DeviceError, DeviceTimeoutError
 from rtcomp.loop.device import OK, STALE, Sample
 from rtcomp_drivers.can_link import CanLink, check_interface
+from rtcomp_drivers.cia402_objects import STAND_IN
 from rtcomp_drivers.cia402_settings import Cia402Settings
 from rtcomp_drivers.cia402_states import (
     DISABLE_VOLTAGE,
@@ -110,6 +111,18 @@ class Cia402Driver(Driver):
             self._give_back(talk)
             raise
         self._talk = talk
+
+    def look(self) -> Sample:
+        """Return a new sample of the drive as it is, not enabled: no torque. Raises DeviceError."""
+        talk = self._talk
+        if talk is None:
+            raise self.not_open()
+        end = time.monotonic() + self.settings.connect_timeout
+        while not talk.step(DISABLE_VOLTAGE):
+            if time.monotonic() > end:
+                raise DeviceTimeoutError(f"{talk.who}: does not answer SYNC; is it still powered?")
+        assert talk.last is not None  # that answer was one
+        return talk.last
 
     def arm(self) -> None:
         """Enable the drive at zero torque; its watchdog runs from now on. The first exchange does it else."""
@@ -219,8 +232,11 @@ class Cia402Driver(Driver):
         check_profile(drive, device_type)
         if drive.has(0x1008):
             with contextlib.suppress(DeviceError):  # a drive without a name
-                drive.who += f" ({drive.text(0x1008)})"
+                named = drive.text(0x1008)
+                drive.who += f" ({named})"
+                self.hardware = not named.startswith(STAND_IN)
                 talk.who = drive.who
+        self.who = drive.who
         talk.why = lambda: self._reason(talk, drive)
         if state_of(drive.read(0x6041)) is State.ENABLED:
             raise DeviceBusyError(

@@ -46,6 +46,8 @@ def _array(
     return [Entry(index, 0, "Number of entries", U8, access, most, group=group), *entries]
 
 
+STAND_IN = "rtcomp simulated"
+"""How the name of a drive begins behind which nothing moves."""
 ENTRIES: list[Entry] = [
     Entry(0x1000, 0, "Device type", U32, "ro", 0x00020192),
     Entry(0x1001, 0, "Error register", U8, "ro"),
@@ -54,7 +56,7 @@ ENTRIES: list[Entry] = [
         *(Entry(0x1003, k, f"Error {k}", U32, "ro") for k in range(1, 5)), count=0, access="rw",
     ),
     Entry(0x1005, 0, "COB-ID SYNC", U32, "rw", 0x80),
-    Entry(0x1008, 0, "Manufacturer device name", TEXT, "const", "rtcomp simulated CiA 402 axis"),
+    Entry(0x1008, 0, "Manufacturer device name", TEXT, "const", f"{STAND_IN} CiA 402 axis"),
     Entry(0x1014, 0, "COB-ID EMCY", U32, "ro", 0x80, of_node=True),
     *_array(0x1016, "Consumer heartbeat time", Entry(0x1016, 1, "Consumer heartbeat time 1", U32, "rw")),
     Entry(0x1017, 0, "Producer heartbeat time", U16, "rw"),

@@ -160,7 +160,7 @@ class OdriveAxis:
         if command == Command.ENCODER_ESTIMATES:
             return [self._frame(command, self._estimates())]
         if command == Command.VERSION and new:
-            version = c.Version(2, (4, 4, 58), self.facts.firmware)
+            version = c.Version(2, c.STAND_IN, self.facts.firmware)
             return [self._frame(command, c.encode_version(version))]
         if command == Command.ERROR and new:
             return [self._frame(command, c.encode_error(self.error, self.reason))]

@@ -108,13 +108,16 @@ class OdriveDriver(Driver):
             self._torque: can.Message = link.message(Command.INPUT_TORQUE, c.encode_torque(0.0))
             if s.velocity_limit is not None and s.current_limit is not None:
                 link.send(Command.LIMITS, c.encode_limits(s.velocity_limit, s.current_limit))
-            self._first_sample(link)
+            self._link = link
+            self.look()
+            self._say_how_fine(link)
             if s.check_watchdog:
                 link.prove_watchdog(s.watchdog)
             else:
                 self.remarks.append(f"{link.who}: its watchdog was not proven (check_watchdog: false)")
             link.check_alone()
         except BaseException:
+            self._link = None
             link.can.close()
             raise
         timer = link.can.latency_timer_ms
@@ -122,7 +125,23 @@ class OdriveDriver(Driver):
             self.remarks.append(
                 f"{link.who}: its adapter's latency timer is {timer} ms; samples will be late"
             )
-        self._link = link
+
+    def look(self) -> Sample:
+        """Return a new sample of the axis as it is, idle: its output stays zero. Raises DeviceError."""
+        link = self._link
+        if link is None:
+            raise self.not_open()
+        for _ in range(3):
+            self._asked, self._waiting = time.monotonic(), True
+            link.can.send(self._request)
+            link.estimates = b""
+            if link.wait(0.1, lambda: bool(link.estimates)):
+                self._estimate(link)
+                assert self._last is not None
+                return self._last
+        raise DeviceTimeoutError(
+            f"{link.who}: does not answer a request for its position; does the adapter pass remote frames?"
+        )
 
     def arm(self) -> None:
         """Have the axis close its loop on zero torque; from now on its watchdog runs, fed by `exchange` only.
@@ -210,6 +229,9 @@ class OdriveDriver(Driver):
         if beat.state != IDLE:
             raise DeviceError(f"{link.who}: is in {state}; wait until it is IDLE")
         self.version = link.check_version()
+        self.who = link.who
+        # No ODrive is product 0: so the axis of the plant server says that nothing moves.
+        self.hardware = self.version is None or self.version.hardware != c.STAND_IN
         if link.faulty:
             self._clear(link)
 
@@ -228,21 +250,9 @@ class OdriveDriver(Driver):
         if not usual:
             self.remarks.append(f"{link.who}: had an error ({why}), cleared")
 
-    def _first_sample(self, link: OdriveLink) -> None:
-        """Have a sample before anything depends on one, and say how fine it is."""
-        for _ in range(3):
-            self._asked, self._waiting = time.monotonic(), True
-            link.can.send(self._request)
-            link.estimates = b""
-            if link.wait(0.1, lambda: bool(link.estimates)):
-                self._estimate(link)
-                break
-        else:
-            raise DeviceTimeoutError(
-                f"{link.who}: does not answer a request for its position; does the adapter pass remote "
-                "frames?"
-            )
-        assert self._last is not None
+    def _say_how_fine(self, link: OdriveLink) -> None:
+        """Remark where positions here are coarser than the stage's sensor."""
+        assert self._last is not None  # look() took one
         turns = abs(self._last.position / self.turn)
         step = self.turn * 2.0 ** (math.floor(math.log2(max(turns, 1e-6))) - 23)
         finest = self.bench.stage.file.sensor.resolution if self.bench.stage is not None else 0.0

@@ -18,7 +18,8 @@ def doctor(as_json: bool) -> None:
     """Look at this machine: rights, memory, clock, processor, ports, CAN interfaces, drivers.
 
     Says what stands in the way of deadlines and devices, what follows from it, and the command that mends it.
-    It changes nothing.
+    It changes nothing. docs/how-to/realtime.md says more of each; `rtcomp bench loop` measures what comes of
+    it.
 
     \b
     Examples:
@@ -41,5 +42,6 @@ def doctor(as_json: bool) -> None:
             click.echo(f"   {'':<{width}}  {click.style(f.mend, bold=True)}")
     count = {state: sum(f.state == state for f in findings) for state in (GOOD, WEAK, BAD)}
     click.echo(
-        f"\n{count[GOOD]} as they should be, {count[WEAK]} could be better, {count[BAD]} stand in the way"
+        f"\n{count[GOOD]} as they should be, {count[WEAK]} could be better, {count[BAD]} stand in the way\n"
+        "What comes of it: rtcomp bench loop --busy"
     )

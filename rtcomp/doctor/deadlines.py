@@ -5,7 +5,6 @@ Paths are looked up below `root`, so that a machine can be described by a folder
 
 from __future__ import annotations
 
-import ctypes
 import os
 import resource
 from collections.abc import Iterator
@@ -13,12 +12,11 @@ from pathlib import Path
 
 from rtcomp.doctor.files import number, text
 from rtcomp.doctor.finding import BAD, GOOD, WEAK, Finding
-from rtcomp.loop.realtime import PRIORITY
+from rtcomp.loop.realtime import PRIORITY, timer_slack_ns
 
 LIMITS = "/etc/security/limits.d/99-rtcomp.conf"
-MEMORY = 512 * 2**20
+MEMORY = 1024 * 2**20
 """bytes that a loop with its libraries locks at the most."""
-_GET_TIMER_SLACK = 30
 _FAST = {"tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page", "xen"}
 """Clock sources that are read without leaving the processor."""
 
@@ -162,9 +160,8 @@ def _governor(root: Path) -> Finding:
 
 def _timer_slack() -> Finding:
     about = "timer slack"
-    try:
-        slack = int(ctypes.CDLL(None).prctl(_GET_TIMER_SLACK, 0, 0, 0, 0))
-    except (AttributeError, OSError):
+    slack = timer_slack_ns()
+    if slack is None:
         return Finding(about, GOOD, "not told by this system")
     if slack <= 50_000:
         return Finding(about, GOOD, f"{slack / 1e3:g} us; none under SCHED_FIFO")

@@ -33,7 +33,7 @@ from rtcomp.jobs.tick_settings import tick_settings
 from rtcomp.kernels import Floats
 from rtcomp.loop.clock import VirtualClock, WallClock
 from rtcomp.loop.device import Device
-from rtcomp.loop.realtime import in_force, realtime_process
+from rtcomp.loop.realtime import PRIORITY, in_force, realtime_process
 from rtcomp.loop.ring import Ring
 from rtcomp.loop.run import Outcome, run, stop_on_signals
 from rtcomp.loop.stop_watch import stop_watch
@@ -187,8 +187,11 @@ def run_loop(
     watch: Watch | None = None,
     metadata: Mapping[str, Any] | None = None,
     partial: bool = False,
+    priority: int = PRIORITY,
 ) -> Run:
     """Run the loop once; record to `path` (HDF5) where one is given, in memory where not.
+
+    On a wall clock it asks for SCHED_FIFO of `priority`.
 
     Raises what the loop raises (DeviceError, LimitError, EmergencyStopError), and Interrupted where a signal
     has ended the run (with `partial` only where it did so in the first moments); the recording up to there is
@@ -215,7 +218,7 @@ def run_loop(
             if wall and watch is not None:
                 stack.enter_context(watch.attach(ring, columns, plan.ticks))
             if wall:
-                in_loop = stack.enter_context(realtime_process())
+                in_loop = stack.enter_context(realtime_process(priority))
             if recorder is not None:
                 recorder.fill(in_loop)
             outcome = run(

@@ -23,7 +23,7 @@ from rtcomp.loop.tick import Compensator, Identifier, Tick, lost_kernel, tick_ke
 from rtcomp.loop.trips import STOPPED_BY, trip
 
 BLOCK = 100_000
-"""Rows of a plan asked for at a time: a run of up to this many ticks never computes references on the way."""
+"""Rows of a plan asked for at a time in virtual time; on a wall clock all of them are there before tick 0."""
 
 
 class Plan(Protocol):
@@ -135,6 +135,9 @@ def run(
     untouched = isinstance(device, Armable)
     warm_up(tick)
     try:
+        # References of 100,000 ticks take tens of milliseconds: between two deadlines that is slots lost.
+        first, last = 0, min(BLOCK, plan.ticks) if virtual else plan.ticks
+        block = plan.rows(first, last)
         connect(device, machine, tick, int(header[STOPPED]))
         untouched = False
         began = time.perf_counter()
@@ -142,8 +145,6 @@ def run(
         volts = 0.0
         mode = state[at.MODE]
         shown = began
-        first = last = 0
-        block = np.zeros((0, at.PLAN_WIDTH))
         while done < plan.ticks:
             if done == last:
                 first, last = done, min(done + BLOCK, plan.ticks)

@@ -374,5 +374,25 @@ def test_a_run_longer_than_a_block_is_the_same_run():
     assert np.array_equal(np.delete(whole.rows, timing, 1), np.delete(blocks.rows, timing, 1))
 
 
+def test_on_a_wall_clock_the_whole_plan_is_there_before_the_device_is_opened():
+    """Rows computed between two deadlines would be late ticks: seen as references asked for after `open`."""
+    asked, noting, whole = [], device(stage()), plan(700)
+
+    class Watched:
+        ticks = whole.ticks
+
+        def rows(self, first, count):
+            asked.append((first, count, len(noting.calls)))
+            return whole.rows(first, count)
+
+    before = run_module.BLOCK
+    run_module.BLOCK = 64
+    try:
+        left = go(noting, tick(), Watched(), LateClock({}))
+    finally:
+        run_module.BLOCK = before
+    assert asked == [(0, 700, 0)] and len(left.rows) == 700
+
+
 def test_the_numbers_of_the_rig_are_those_of_its_stage():
     assert stage().mass == MASS and stage().mechanics.viscous == VISCOUS

@@ -114,6 +114,47 @@ def test_a_killed_run_keeps_its_file(tmp_path: Path) -> None:
         assert found[f"{who} killed: files that open"]["value"] == 1.0
 
 
+def test_damage_into_the_hosts_end(tmp_path: Path) -> None:
+    found = figures(tmp_path, "bench_fuzz.py", "--bytes", 200_000)
+    assert found["bad ones among them"]["value"] == 0.0
+    assert found["messages accepted"]["value"] > 500
+
+
+@pytest.mark.slow
+def test_lateness_beside_its_rivals(tmp_path: Path) -> None:
+    found = figures(tmp_path, "bench_lateness.py", "--seconds", 0.5, "--rate", 500, "--rate", 1000)
+    for head in ("0.5 kHz", "1 kHz", "1 kHz, serial link"):
+        assert 0.0 <= found[f"{head}: slots missed"]["value"] <= 100.0
+        assert sum(name.startswith(f"{head}: ") for name in found) == 5
+
+
+@pytest.mark.slow
+def test_round_trips_beside_raw_ones(tmp_path: Path) -> None:
+    found = figures(tmp_path, "bench_roundtrip.py", "--seconds", 0.5, "--rate", 200)
+    assert found["serial, board in Python: exchanges otherwise than well"]["unit"] == "of 100"
+    assert found["serial, board in Python: p50 over raw"]["target"] == "<= 1.3"
+
+
+@pytest.mark.slow
+def test_a_loop_killed_and_one_stopped(tmp_path: Path) -> None:
+    found = figures(tmp_path, "bench_watchdog.py", "--moments", 1)
+    for number in ("SIGKILL", "SIGSTOP"):
+        head = f"board in Python, {number}"
+        assert found[f"{head}: zeroed by the watchdog"]["value"] == 1.0
+        assert found[f"{head}: a new host is refused"]["value"] == 1.0
+        assert found[f"{head}: DISARMED once cleared"]["value"] == 1.0
+        assert found[f"{head}: output when armed again, most"]["value"] == 0.0
+
+
+@pytest.mark.slow
+def test_endurance_in_short(tmp_path: Path) -> None:
+    found = figures(tmp_path, "bench_endurance.py", "--hours", 0.002, "--wall", 0.05)
+    for head in ("0.002 h virtual at 10 kHz", "0.05 min over serial at 1 kHz"):
+        assert found[f"{head}: rows in the file"]["value"] == 100.0
+        assert found[f"{head}: counters off"]["value"] == 0.0
+    assert found["0.002 h virtual at 10 kHz: slots lost"]["value"] == 0.0
+
+
 @pytest.mark.slow
 @pytest.mark.realtime
 def test_the_serial_link(tmp_path: Path) -> None:
