@@ -86,12 +86,16 @@ def fit_base(
     for scale in scales:
         ledger = Ledger(stage, motion, grid_of(stage, scale), known)
         # What asks for the whole of friction is given first the fit without it, then the one with it.
-        rounds = 3 if any(e.name in WHOLE for e in effects or ()) else 1
+        names = {e.name for e in effects or ()}
+        rounds = 3 if names & set(WHOLE) else 1
+        # What hangs behind a play carries the friction that is found with it.
+        rounds = max(rounds, 2 if "backlash" in names else 1)
         for i in range(rounds):
-            system = ledger.system((effects or []) if rounds == 1 or i else [])
+            system = ledger.system((effects or []) if i or not names & set(WHOLE) else [])
             bounds = bounds_of(stage, system.columns.shape[1], names=[e.name for e in effects or ()])
             found = system.blocks.coefficients(ledger.seen, bounds)
             ledger.weigh(found[FIXED : FIXED + ledger.reaches.size])
+            ledger.found_with_play = "backlash" in names
         errors = system.blocks.left_out(ledger.seen, bounds)
         if best is None or errors.sum() < best.errors.sum():
             best = Fitted(ledger, system, bounds, errors, scale)

@@ -208,7 +208,10 @@ def _look_ahead(
     Where two effects hide in each other the first one found had to do for both, and may be neither.
     """
     best = first.best
-    if best is None or best.errors.sum() < ABOVE_FLOOR * floor.sum():
+    enough = ABOVE_FLOOR * float(floor.sum())
+    settled = best is not None and float(best.errors.sum()) < enough
+    # A free curve explains waves as well as waves do, and names nothing.
+    if best is None or (settled and last(best) not in SHAPELESS):
         return first, None
     gain = float(base.errors.sum() - best.errors.sum())
     group = next((set(g) for g in ONE_THING if last(best) in g), {last(best)})
@@ -221,9 +224,9 @@ def _look_ahead(
     ]
     if not rivals or not _worth_it(base.errors, best.errors, floor):
         return first, None
-    own = best_addition(stage, motion, best.fitted, best.entries, progress, without)
+    own = None if settled else best_addition(stage, motion, best.fitted, best.entries, progress, without)
     chosen, ahead = best, own
-    left = float((own.best or best).errors.sum())
+    left = float((own.best if own is not None and own.best is not None else best).errors.sum())
     for rival in rivals[:RIVALS]:
         other = best_addition(stage, motion, rival.fitted, rival.entries, progress, without)
         both = other.best
@@ -231,7 +234,8 @@ def _look_ahead(
             continue
         if not _settles_the_rest(base.errors, rival.errors, both.errors, floor):
             continue
-        if float(both.errors.sum()) < (SHAPED if last(chosen) in SHAPELESS else TOGETHER) * left:
+        most = max(SHAPED * left, enough) if last(chosen) in SHAPELESS else TOGETHER * left
+        if float(both.errors.sum()) < most:
             chosen, ahead, left = rival, other, float(both.errors.sum())
     others = [best, *(r for r in first.others if r is not chosen)] if chosen is not best else first.others
     return replace(first, best=chosen, others=others), ahead

@@ -31,6 +31,9 @@ again, beyond which names are taken back."""
 LEAST, MUCH, OPEN = 0.35, 0.7, 0.2
 """Part of the held-out squared error above the floor that names with a shape of their own must explain: in
 general, and where they leave more than the part OPEN of the mismatch that was seen."""
+FAR, NEARLY_ALL = 4.0, 0.97
+"""A lone name that leaves more than FAR times the floor of what was put aside, and explains less than
+NEARLY_ALL of its squared error above that, is the nearest of the catalogue to something that is not in it."""
 STRAYED = 9.0
 """How much further (see `departure`) than half again the retuning names may take what is believed."""
 AGAIN = 2
@@ -86,7 +89,8 @@ def explain(
         shaped = any(str(e["name"]) not in SHAPELESS for e in entries)
         least_part = MUCH if decision.left(floor) > OPEN else LEAST
         strays = shaped and departure(final) > 1.5 * departure(base) + STRAYED
-        if not named or (_holds(fit) and not strays and not (shaped and _explains_little(fit, least_part))):
+        little = shaped and (_explains_little(fit, least_part) or (len(named) == 1 and _leaves_much(fit)))
+        if not named or (_holds(fit) and not strays and not little):
             return Explanation(decision, named, entries, own, final, fit)
         without |= {first}
     # What the ledger gains must hold in the stage itself; else it is not offered as an explanation.
@@ -106,6 +110,11 @@ def _explains_little(fit: Fit, least: float) -> bool:
     """Tell whether names explain so little of what was put aside that they are the nearest, not the right."""
     floor = (1.5 * fit.floor) ** 2
     return fit.retuned**2 > floor and fit.after**2 - floor > (1.0 - least) * (fit.retuned**2 - floor)
+
+
+def _leaves_much(fit: Fit) -> bool:
+    """Tell whether far more than noise is left of what was put aside, and more than trimming explains."""
+    return fit.after > FAR * fit.floor and _explains_little(fit, NEARLY_ALL)
 
 
 def _held_out(stage: Stage, motion: Motion) -> float:

@@ -67,6 +67,8 @@ class Ledger:
         self.seen = np.ones(BLOCKS, dtype=np.bool_)
         self.seen[list(self.motion.unseen)] = False
         self.weights = believed_weights(self.stage, self.reaches)
+        self.found_with_play = False
+        """Whether the weights are those found with a play at work: then its load carries that friction."""
         self._plain: System | None = None
         self._paths: tuple[object, list[tuple[Floats, Floats, Floats]]] = (None, [])
         self._frictions: dict[object, Floats] = {}
@@ -157,10 +159,10 @@ class Ledger:
         return self._paths[1]
 
     def _behind(self, x: Floats, play: Effect) -> Floats:
-        # As believed: a play that is not yet in the balance is taken for longer reaches.
         m, friction = self.stage.mechanics, self.stage.friction
         weights, reaches = self.weights, self.reaches
-        if isinstance(friction, MaxwellSlip):
+        if isinstance(friction, MaxwellSlip) and not self.found_with_play:
+            # As believed: a play that is not yet in the balance is taken for longer reaches.
             weights, reaches = (np.array(c) for c in zip(*friction.elements, strict=True))
         load = Load(
             play.values["share"] * m.mass, m.viscous, m.micro_damping, m.micro_damping_speed, weights, reaches
