@@ -70,8 +70,7 @@ def demo(
         if serial:
             plant = stack.enter_context(PlantProcess(path))
             seconds = seconds or 20.0
-            # On a machine that is busy a demonstration goes on where hardware would be stopped.
-            chosen = lasting(load(path, port=plant.port), seconds).changed(loop={"slots_lost": 1_000_000_000})
+            chosen = lasting(load(path, port=plant.port), seconds)
         elif seconds is not None:
             chosen = lasting(chosen, seconds)
         titles = ["live", "learn", "judge", "without", "with", "believed", "hidden", "found"]

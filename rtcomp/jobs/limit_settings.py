@@ -58,4 +58,7 @@ class Loop(Section):
         "host-paced", description="whose clock decides what is late: the host's, or the device's"
     )
     late: float = Field(0.5, gt=0, le=1, description="share of the period from which a tick counts as late")
-    slots_lost: int = Field(20, ge=1, le=1_000_000_000, description="slots lost after which the loop stops")
+    slots_lost: int | None = Field(
+        None, ge=1, le=1_000_000_000,
+        description="slots lost after which the loop stops; without it 20 on hardware, none elsewhere",
+    )  # fmt: skip

@@ -231,6 +231,7 @@ def run_loop(
                 progress=None if watch is None else lambda n, _: watch.update(n, plan.ticks, ring, columns),
                 recorder_alive=None if recorder is None else lambda: recorder.alive,
                 tell=None if recorder is None else recorder.tell,
+                spare_stand_ins=config.run.loop.slots_lost is None,
             )
             if not wall and watch is not None:
                 watch.update(plan.ticks, plan.ticks, ring, columns)

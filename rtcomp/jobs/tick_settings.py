@@ -14,6 +14,8 @@ FULL_DRIVE = 0.98
 """Of the voltage limit: what counts as driven with all there is."""
 NOISE_COUNTS = 6.0
 """Times the sensor's rms noise that a resting position may flicker."""
+SLOTS_LOST = 20
+"""Slots lost after which a loop stops, unless told."""
 MOST_FORCE = 10.0
 """Times what the drive can give at most: a model that says more has diverged."""
 
@@ -54,7 +56,7 @@ def tick_settings(config: Configuration, delay_ticks: int, closed_loop: bool) ->
         age_ticks=math.ceil(limits.age / config.period - 1e-9),
         invalid_ticks=math.floor(limits.invalid / config.period + 1e-9),
         late=loop.late,
-        slots_lost=loop.slots_lost,
+        slots_lost=SLOTS_LOST if loop.slots_lost is None else loop.slots_lost,
         device_paced=loop.overrun == "device-paced",
         force_bound=MOST_FORCE * stage.force_constant * stage.voltage_limit,
     )

@@ -97,6 +97,14 @@ def test_too_many_slots_lost_is_a_latched_fault_at_zero_volts(at_once):
     assert left.column("state")[-1] == State.FAULT
 
 
+def test_on_what_is_no_hardware_lost_slots_may_be_counted_only():
+    late = {300: 40.3e-3}
+    stand_in, real = device(stage()).inner, device(stage())
+    left = go(stand_in, tick(slots_lost=20), plan(TICKS), LateClock(late), spare_stand_ins=True)
+    assert left.outcome.lost == 40 and left.outcome.stopped_by == "end" and left.outcome.degraded == 1
+    go(real, tick(slots_lost=20), plan(TICKS), LateClock(late), error=DeviceError, spare_stand_ins=True)
+
+
 def test_one_slot_in_a_hundred_may_be_lost_for_ever():
     rare = {50 + 110 * k: 1.2e-3 for k in range(60)}
     left = go(device(stage()), tick(slots_lost=20), plan(7000), LateClock(rare))
