@@ -116,7 +116,7 @@ def run(
     emptied as long as `recorder_alive()`, on a wall clock never.
 
     `machine` is the state of the loop, followed through all of it. `tell(time (s), state, line)` is told why
-    it ended, before the ring is closed. With `spare_stand_ins` lost slots are only counted, and never a fault,
+    it ended, before the ring is closed. With `spare_stand_ins` lost slots are only counted, never a fault,
     on a device that says it is no hardware: nothing can be hurt there, and machines of tests are busy.
 
     Raises DeviceError where the device fails or reports what cannot be, LimitError where the axis leaves its
