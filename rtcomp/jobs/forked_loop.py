@@ -14,7 +14,7 @@ import time
 from collections.abc import Sequence
 from typing import Any, Self
 
-from rtcomp_drivers.faults import Fault, FaultyDevice
+from rtcomp_drivers.faults import Fault, FaultyDevice, FaultyLink
 
 from rtcomp.control.references import Reference
 from rtcomp.errors import RtcompError
@@ -23,6 +23,7 @@ from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.identify import ALWAYS
 from rtcomp.jobs.plan import ReferencePlan
 from rtcomp.jobs.session import make_device, make_tick, run_loop
+from rtcomp.loop.device import Armable
 
 RUNNING_TICKS = 200
 """Exchanges after which a loop counts as running: it moves, learns and feeds forward."""
@@ -31,7 +32,8 @@ RUNNING_TICKS = 200
 class ForkedLoop:
     """A loop along `reference` for `seconds`, learning and feeding forward, with `faults` in its device.
 
-    A context manager; at its end the process is gone, however it stood.
+    It counts as running after `running` exchanges. A context manager; at its end the process is gone, however
+    it stood.
     """
 
     def __init__(
@@ -41,6 +43,7 @@ class ForkedLoop:
         seconds: float,
         model: HysteresisModel | None = None,
         faults: Sequence[Fault] = (),
+        running: int = RUNNING_TICKS,
     ) -> None:
         self.told: dict[str, Any] = {}
         """What it said: `running` and `fault` (s, monotonic), `ended` (s), `error` (its name), `says`."""
@@ -53,7 +56,7 @@ class ForkedLoop:
             status = 70
             try:
                 os.close(self._pipe)
-                status = _loop(config, reference, seconds, model, faults, ours)
+                status = _loop(config, reference, seconds, model, faults, running, ours)
             finally:
                 os._exit(status)
         os.close(ours)
@@ -107,6 +110,7 @@ def _loop(
     seconds: float,
     model: HysteresisModel | None,
     faults: Sequence[Fault],
+    running: int,
     pipe: int,
 ) -> int:
     """The loop's process: run until the end, a fault or a signal; return the exit status."""
@@ -118,7 +122,9 @@ def _loop(
         return Fault("call", number, 1, call=lambda: tell(**{name: time.monotonic()}))
 
     first = [at(min(fault.at for fault in faults), "fault")] if faults else []
-    device = FaultyDevice(make_device(config), [at(RUNNING_TICKS, "running"), *first, *faults])
+    inner = make_device(config)
+    kind = FaultyLink if isinstance(inner, Armable) else FaultyDevice
+    device = kind(inner, [at(running, "running"), *first, *faults])
     tick = make_tick(config, device.delay_ticks, model)
     ticks = round(seconds * config.stage.rate)
     plan = ReferencePlan(reference, config.stage, config.period, ticks, device.delay_ticks, ALWAYS, 0.0)

@@ -18,17 +18,19 @@ from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.hil_device import device_on, patient, plant_on
 from rtcomp.jobs.hil_faults import Seen, provoke
 from rtcomp.jobs.identify import Identified, identify
-from rtcomp.jobs.session import Run, Watch, check
+from rtcomp.jobs.session import Run, Watch, check, make_device
 from rtcomp.loop.states import State
 from rtcomp.stage.stage import Stage
 
 SAME_MODEL = 0.02
 """Share of the largest force by which the virgin curves of two links may differ."""
 
-RECOVERY_S = 0.3
-"""s after a missed slot until feedforward is back to its full share, and the error to what it was."""
+RECOVERY_S = 1.5
+"""s after DEGRADED until the integral has given back what it took over from the feedforward, as measured."""
 LEAST_KEPT = 0.2
-"""Share of a run with deadlines kept from which it can be judged."""
+"""Share of a run, with deadlines kept for so long, from which it is judged."""
+ATTEMPTS = 3
+"""Times that compensating is tried on a machine that leaves less than that."""
 
 
 @dataclass(frozen=True)
@@ -49,27 +51,24 @@ class Tracked:
     link: str
     identified: Identified
     compensated: Compensated
+    attempts: int = 1
+    """Times that it was compensated; what counts is the last."""
 
     @property
     def kept(self) -> tuple[float, float]:
-        """Rms tracking error without over with, and the share of the rows that it is of.
+        """Rms tracking error without over with, and the share of the rows that it is of: the same in both.
 
-        Left out is what follows a missed slot or falls into DEGRADED, in either run: that judges the machine.
+        Left out is what follows missed deadlines in the run with feedforward: that judges the machine.
         """
-        runs, settle = (self.compensated.without, self.compensated.with_it), self.compensated_settle
-        rms, share = [], 1.0
-        for run in runs:
-            counts = run.columns["time"] >= settle
-            good = counts & run.measured & undisturbed(run)
-            share = min(share, int(good.sum()) / max(1, int(counts.sum())))
-            error = (run.columns["reference"] - run.columns["position"])[good]
+        without, with_it = self.compensated.without, self.compensated.with_it
+        counts = with_it.columns["time"] >= self.compensated.config.run.compensate.settle
+        good = counts & undisturbed(with_it)
+        rms = []
+        for run in (without, with_it):
+            rows = good & run.measured
+            error = (run.columns["reference"] - run.columns["position"])[rows]
             rms.append(float(np.sqrt(np.mean(error**2))) if error.size else np.nan)
-        return rms[0] / rms[1], share
-
-    @property
-    def compensated_settle(self) -> float:
-        """s at the start of each run that do not count."""
-        return self.compensated.config.run.compensate.settle
+        return rms[0] / rms[1], int(good.sum()) / max(1, int(counts.sum()))
 
     def missed(self) -> dict[str, int]:
         """Return ticks, and how many of them came late, were lost, or had no new sample."""
@@ -104,6 +103,7 @@ class Hil:
                 one.link: {
                     "improvement": one.kept[0],
                     "improvement_over": one.kept[1],
+                    "attempts": one.attempts,
                     "improvement_with_missed_slots": one.compensated.improvement,
                     "tracking_rms_without_m": one.compensated.error_without.rms,
                     "tracking_rms_with_m": one.compensated.error_with.rms,
@@ -137,6 +137,8 @@ def hil(
     """
     needed(config)
     friction_in(stage)
+    for link in links:  # a package that is missing is missed before the first link has run
+        make_device(config.changed(device=device_on(link, "/dev/null", patience, config.stage.axis)))
     found = Hil()
 
     def verdict(link: str, what: str, required: str, seen: str, good: bool) -> None:
@@ -187,8 +189,14 @@ def track(
         learned = identify(here.changed(judge={}), out=out, watch=watch)
         if learned.signal is not None:
             raise Interrupted(learned.signal, f"stopped while identifying over {link}")
-        done = compensate(here, learned.model, out=out, watch=watch)
-    return Tracked(link, learned, done)
+        for attempt in range(1, ATTEMPTS + 1):
+            if out is not None:
+                for name in ("without.h5", "with.h5"):
+                    (out / name).unlink(missing_ok=True)
+            one = Tracked(link, learned, compensate(here, learned.model, out=out, watch=watch), attempt)
+            if one.kept[1] >= LEAST_KEPT:
+                break
+    return one
 
 
 def difference(one: HysteresisModel, other: HysteresisModel) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 from typing import Any
 
@@ -26,17 +27,19 @@ def device_on(link: str, port: str, watchdog: float, axis: str, *, prove: bool =
     common: dict[str, Any] = {
         "driver": link, "watchdog": watchdog, "max_missed": _MISSED, "connect_timeout": _CONNECT_S,
     }  # fmt: skip
+    if link not in LINKS:
+        raise ConfigError(f"hil: unknown link {link!r}; {nearest(link, LINKS)}")
     if link == "serial":
         return {**common, "port": port}
+    if importlib.util.find_spec("can") is None:
+        raise ConfigError(f"hil: the link {link!r} needs python-can; pip install 'rtcomp[can]'")
     common |= {"interface": "slcan", "channel": port, "bitrate": 1_000_000}
     if link == "odrive-can":
         from rtcomp_drivers.odrive_axis import LEAD
 
         lead = {"lead": LEAD} if axis == "linear" else {}
         return {**common, **lead, "check_watchdog": prove, "heartbeat_timeout": 10.0}
-    if link == "cia402":
-        return {**common, "node": 5}
-    raise ConfigError(f"hil: unknown link {link!r}; {nearest(link, LINKS)}")
+    return {**common, "node": 5}
 
 
 def plant_on(link: str, stage: Path, watchdog: float, *, seed: int = 0) -> PlantProcess:
