@@ -36,7 +36,7 @@ COMMANDS = {
     "drivers": ("rtcomp.cli.drivers:drivers", "List the installed drivers and their settings."),
     "doctor": ("rtcomp.cli.doctor:doctor", "Look at this machine: is it fit for a loop, what mends it."),
     "bench": ("rtcomp.cli.bench:bench", "Measure deadlines, links and ticks beside plain rivals."),
-    "hil": ("rtcomp.cli.hil:hil", "Run a configuration over every link, and faults, against stand-ins."),
+    "hil": ("rtcomp.cli.hil:hil", "Both jobs and faults over every link, against stand-ins."),
     "plant": ("rtcomp.cli.plant:plant", "Stand in for hardware: serve a simulated stage on a port."),
 }
 """Every command: where it stands, and what it does in one line (so that help imports none of them)."""
