@@ -72,7 +72,7 @@ def hil(
     Examples:
       rtcomp hil configs/leuven.yaml
       rtcomp hil configs/leuven.yaml --link serial --fault all --seconds 5
-      rtcomp hil configs/odrive_can.yaml --plant configs/leuven.yaml --fault none
+      rtcomp hil configs/odrive_can.yaml --plant configs/leuven.yaml --at-least 10
     """
     from rtcomp.jobs.hil import friction_in, needed
     from rtcomp.jobs.hil import hil as run
