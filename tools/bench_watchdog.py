@@ -13,14 +13,13 @@ import contextlib
 import os
 import random
 import signal
-import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import click
 import numpy as np
-from bench_kill import children, ring_of
+from bench_kill import children
 from bench_roundtrip import firmware
 from figures_table import Figure, show
 from rtcomp_drivers import protocol
@@ -30,9 +29,10 @@ from rtcomp_drivers.registry import create
 from rtcomp_drivers.serial_link import SerialLink
 
 from rtcomp.cli.runs import load
-from rtcomp.errors import DeviceError, RtcompError
+from rtcomp.errors import DeviceError
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
+from rtcomp.jobs.forked_loop import ForkedLoop
 from rtcomp.jobs.identify import ALWAYS
 from rtcomp.jobs.plan import ReferencePlan
 from rtcomp.jobs.session import make_device, make_tick, run_loop
@@ -71,57 +71,21 @@ class Seen:
     """Stopped loops that were let go on, and ended by an error without a word more to the motor."""
 
 
-def begin(config: Configuration) -> int:
-    """Fork a loop, which finds everything loaded and compiled; return its process id once it runs."""
-    pid = os.fork()
-    if pid == 0:
-        status = 70
-        try:
-            status = host(config)
-        finally:
-            os._exit(status)
-    end = time.monotonic() + PATIENCE_S
-    while time.monotonic() < end:
-        ring = ring_of(pid)
-        if ring is not None:
-            ring.release()
-            return pid
-        time.sleep(2e-3)
-    raise RuntimeError(f"the loop did not begin within {PATIENCE_S:g} s")
-
-
-def host(config: Configuration) -> int:
-    """The loop's process: run until the device or a signal ends it; return the exit status."""
-    device = make_device(config)
-    tick = make_tick(config, device.delay_ticks)
-    ticks = round(LONGEST_RUN_S * config.stage.rate)
-    plan = ReferencePlan(config.reference(), config.stage, config.period, ticks, 1, ALWAYS, 0.0)
-    try:
-        run_loop(config, plan, device, tick)
-    except RtcompError as error:
-        print(error, file=sys.stderr)
-        return error.exit_status
-    return 0
-
-
 def one(config: Configuration, number: int, moment: float, seen: Seen) -> tuple[float, float]:
     """Signal a running loop at `moment` (s), look at the device afterwards; return when it began and when
     the signal was sent (s, monotonic)."""
     began = time.monotonic()
-    pid = begin(config)
-    time.sleep(moment)
-    os.kill(pid, number)
-    sent = time.monotonic()
-    seen.moments += 1
-    if number == signal.SIGKILL:
-        os.waitpid(pid, 0)
+    with ForkedLoop(config, config.reference(), LONGEST_RUN_S, running=1) as loop:
+        if not loop.wait_for("running", PATIENCE_S):
+            raise RuntimeError(f"the loop did not begin within {PATIENCE_S:g} s: {loop.told}")
+        time.sleep(moment)
+        sent = loop.signal(number)
+        seen.moments += 1
         time.sleep(WATCHDOG_S + SETTLE_S)
-    else:
-        time.sleep(WATCHDOG_S + SETTLE_S)
-        os.kill(pid, signal.SIGCONT)
-        status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-        seen.went_on += status == 2
-        time.sleep(SETTLE_S)
+        if number == signal.SIGSTOP:
+            loop.signal(signal.SIGCONT)
+            seen.went_on += loop.join(PATIENCE_S) == 2
+            time.sleep(SETTLE_S)
     look_again(config, seen)
     return began, sent
 

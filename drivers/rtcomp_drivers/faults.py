@@ -11,10 +11,11 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 from rtcomp.errors import DeviceError
 from rtcomp.loop.clock import Clock
-from rtcomp.loop.device import ESTOP, INVALID, OK, STALE, Device, Sample
+from rtcomp.loop.device import ESTOP, INVALID, OK, STALE, Armable, Device, Sample
 
 KINDS = {
     "no reply": "no sample comes; the newest one is handed out again, marked stale",
@@ -119,6 +120,18 @@ class FaultyDevice:
                 assert fault.call is not None
                 fault.call()
         return sample
+
+
+class FaultyLink(FaultyDevice):
+    """The same around a device that can be looked at before it is armed, as every real link can."""
+
+    def look(self) -> Sample:
+        """Look at the inner device, which is as it is."""
+        return cast(Armable, self.inner).look()
+
+    def arm(self) -> None:
+        """Arm the inner device."""
+        cast(Armable, self.inner).arm()
 
 
 class FaultyClock:

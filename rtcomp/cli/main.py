@@ -1,7 +1,7 @@
 """The command `rtcomp`: finds its commands, and turns every error into one line and an exit status.
 
-Exit status: 0 done, 2 unusable input or a device that fails, 70 a defect of the program, 130 and 143
-interrupted by SIGINT and SIGTERM, 141 nobody reads the output any more.
+Exit status: 0 done, 1 done and a verdict does not hold (`hil`), 2 unusable input or a device that fails, 70 a
+defect of the program, 130 and 143 interrupted by SIGINT and SIGTERM, 141 nobody reads the output any more.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ COMMANDS = {
     "drivers": ("rtcomp.cli.drivers:drivers", "List the installed drivers and their settings."),
     "doctor": ("rtcomp.cli.doctor:doctor", "Look at this machine: is it fit for a loop, what mends it."),
     "bench": ("rtcomp.cli.bench:bench", "Measure deadlines, links and ticks beside plain rivals."),
+    "hil": ("rtcomp.cli.hil:hil", "Both jobs and faults over every link, against stand-ins."),
     "plant": ("rtcomp.cli.plant:plant", "Stand in for hardware: serve a simulated stage on a port."),
 }
 """Every command: where it stands, and what it does in one line (so that help imports none of them)."""

@@ -17,7 +17,7 @@ from rich.text import Text
 from rtcomp.report.page import Row
 from rtcomp.report.quantities import si, written
 
-__all__ = ["Progress", "Row", "print_summary", "say", "si", "summary_table"]
+__all__ = ["Progress", "Row", "print_summary", "print_verdicts", "say", "si", "summary_table"]
 
 _PERIOD = 1.0 / 8.0
 
@@ -134,3 +134,20 @@ def summary_table(title: str, rows: Sequence[Row | tuple[Any, ...]]) -> Table:
 def print_summary(title: str, rows: Sequence[Row | tuple[Any, ...]], console: Console | None = None) -> None:
     """Print `summary_table` to standard output."""
     (console or Console()).print(summary_table(title, rows))
+
+
+def print_verdicts(
+    title: str, rows: Sequence[tuple[str, str, str, str, bool]], console: Console | None = None
+) -> None:
+    """Print a table of verdicts to standard output: link, what, required, seen, and whether it holds."""
+    table = Table(title=Text(title, style="bold"), title_justify="left", box=box.HORIZONTALS)
+    for head in ("link", "what", "required", "seen"):
+        table.add_column(head, overflow="fold")
+    table.add_column("verdict", no_wrap=True)
+    before = ""
+    for link, what, required, seen, good in rows:
+        mark = Text("holds", style="green") if good else Text("BAD", style="bold red")
+        shown = link if link != before else ""
+        table.add_row(Text(shown), Text(what), Text(required), Text(seen), mark)
+        before = link
+    (console or Console()).print(table)

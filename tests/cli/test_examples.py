@@ -23,8 +23,8 @@ from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.recording.reader import load
 
 PROJECT = Path(__file__).resolve().parents[2]
-SLOW = ("--serial", "--port", "rtcomp trial")
-ONCE = ("demo", "diagnose", "trial")
+SLOW = ("--serial", "--port", "rtcomp trial", "rtcomp hil")
+ONCE = ("demo", "diagnose", "trial", "hil")
 """Commands that take long: run with `--json` only."""
 
 

@@ -61,10 +61,12 @@ def test_round_trips_are_judged_by_their_ratio_and_odd_ones_counted() -> None:
         1000.0, Spread.of([50.0] * 50 + [90.0] * 50), Spread.of([40.0] * 50 + [60.0] * 50),
         {"sent": 102, "samples": 101, "missed": 2, "duplicate": 1}, {},
     )  # fmt: skip
-    found = {f.name: (f.value, f.met) for f in bench_roundtrip.figures_of(trips, "board")}
+    found = {f.name: (f.value, f.met) for f in bench_roundtrip.figures_of(trips, "serial, board")}
     assert found["serial, board: p50 over raw"] == (1.25, True)
     assert found["serial, board: p99 over raw"] == (1.5, False)
     assert found["serial, board: exchanges otherwise than well"] == (3.0, None)
+    found = {f.name: f.met for f in bench_roundtrip.figures_of(trips, "can", "python-can", 1.2)}
+    assert found["can: p50 over python-can"] is False
 
 
 def test_one_moment_without_a_watchdog_is_told() -> None:

@@ -133,6 +133,8 @@ def test_round_trips_beside_raw_ones(tmp_path: Path) -> None:
     found = figures(tmp_path, "bench_roundtrip.py", "--seconds", 0.5, "--rate", 200)
     assert found["serial, board in Python: exchanges otherwise than well"]["unit"] == "of 100"
     assert found["serial, board in Python: p50 over raw"]["target"] == "<= 1.3"
+    assert found["odrive-can on slcan: exchanges otherwise than well"]["unit"] == "of 100"
+    assert found["odrive-can on slcan: p50 over python-can"]["target"] == "<= 1.2"
 
 
 @pytest.mark.slow
