@@ -178,6 +178,7 @@ def tick_kernel(
         state[at.GOOD] = 0.0
     # Where the device sets the pace, a tick is late when its sample did not come, not when the host was.
     late = (not fresh) if settings[at.DEVICE_PACED] > 0.0 else row[at.ROW_LATENESS] > settings[at.LATE_US]
+    share_before = state[at.SHARE]
     keep_pace(state, 1 if late else 0)
     row[at.ROW_STATE] = state[at.MODE]
     state[at.X2] = state[at.X1]
@@ -197,16 +198,19 @@ def tick_kernel(
         # Feedforward goes off at once and without a jump: the integral takes over what it gave.
         most = c.pid_p[INTEGRAL_LIMIT]
         c.pid_s[INTEGRAL] = min(max(c.pid_s[INTEGRAL] + state[at.HANDED], -most), most)
+    full = plan[at.FEEDFORWARD] * (plan[at.LEAD_FORCE] + lead) / settings[at.FORCE_CONSTANT]
+    back = state[at.SHARE] - share_before
+    if back > 0.0 and c.pid_p[KI] > 0.0:
+        # As it fades back the integral, which has carried the friction meanwhile, gives up as much.
+        most = c.pid_p[INTEGRAL_LIMIT]
+        c.pid_s[INTEGRAL] = min(max(c.pid_s[INTEGRAL] - back * full, -most), most)
     feedback = plan[at.VOLTS]
     if closed:
         error = plan[at.REFERENCE] - position
         if gap and fresh:  # a derivative across what was not measured would be a kick
             c.pid_s[LAST_INPUT] = -position if c.pid_p[ON_MEASUREMENT] == 1.0 else error
         feedback = pid_step(c.pid_p, c.pid_s, error, position, state[at.EXCESS])
-    feedforward = 0.0
-    share = plan[at.FEEDFORWARD] * state[at.SHARE]
-    if share > 0.0:
-        feedforward = share * (plan[at.LEAD_FORCE] + lead) / settings[at.FORCE_CONSTANT]
+    feedforward = state[at.SHARE] * full if plan[at.FEEDFORWARD] > 0.0 else 0.0
     state[at.HANDED] = feedforward
     asked = feedback + feedforward
     volts = limit_step(c.limit_p, c.limit_s, asked)

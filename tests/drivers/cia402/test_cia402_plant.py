@@ -135,7 +135,7 @@ def test_a_host_that_dies_or_stands_still_leaves_a_zero_output(plant, how, times
     watchdog = [z for z in summary["zeroings"] if z["cause"] == "watchdog"]
     assert len(watchdog) == times
     for zeroing, silent_since in zip(watchdog, silent, strict=True):
-        assert zeroing["since_command"] <= WATCHDOG_S + 1e-6
+        assert zeroing["since_command"] <= WATCHDOG_S + 2e-3  # its heartbeat follows a command a frame later
         after_silence = summary["started_monotonic_s"] + zeroing["time"] - silent_since
         assert after_silence < WATCHDOG_S + SLACK_S + summary["lost_s"]  # that much its clock was put on
         assert zeroing["noticed_after"] < SLACK_S
