@@ -8,8 +8,14 @@ import pytest
 from rtcomp.errors import RecordingError
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.jobs.compensate import Tracking, compensate, live
+from rtcomp.jobs.plan import ReferencePlan
 from rtcomp.jobs.replay import replay
+from rtcomp.jobs.session import make_device, make_tick
 from rtcomp.jobs.simulate import closed_loop, on_reference, open_loop
+from rtcomp.loop.clock import VirtualClock
+from rtcomp.loop.ring import Ring
+from rtcomp.loop.run import run as run_loop
+from rtcomp.loop.tick import COLUMNS
 from rtcomp.recording.reader import read
 
 BRIEF = {
@@ -32,6 +38,32 @@ def test_the_tracking_error_falls_at_least_twentyfold(leuven, identified, delay)
     assert done.model is identified.model
     for run in (done.without, done.with_it):
         assert run.outcome.ticks == 6000 and run.delay_ticks == delay
+
+
+def test_a_lost_slot_costs_moments_not_seconds(leuven, identified):
+    """Feedforward goes and comes back; what the integral carried meanwhile it must not go on carrying."""
+
+    class LateOnce(VirtualClock):
+        def wait(self, tick):
+            return 1.2 * leuven.period if tick == 2000 else 0.0
+
+    config = leuven.changed(compensate={"reference": BRIEF})
+    errors = []
+    for clock in (VirtualClock(), LateOnce()):
+        device = make_device(config)
+        tick = make_tick(config, device.delay_ticks, identified.model)
+        plan = ReferencePlan(
+            config.reference("compensate"), config.stage, config.period, 5000, feedforward_from=0.0
+        )
+        ring = Ring.create(5001, tick.row_width)
+        assert run_loop(device, tick, plan, clock, ring).lost == (1 if isinstance(clock, LateOnce) else 0)
+        rows = ring.take()
+        ring.release()
+        reference, position = (rows[:, COLUMNS.index(name)] for name in ("reference", "position"))
+        errors.append(np.abs(reference - position))
+    quiet, late = errors
+    assert late[2000:].max() < 10 * quiet[1000:].max()
+    assert late[2300:].max() < 2 * quiet[1000:].max()
 
 
 def test_the_comparison_is_of_one_reference_one_noise_one_controller(leuven, identified):
