@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rtcomp.control.references import Reference
 from rtcomp.errors import NotArmedError
 from rtcomp.loop.realtime import realtime_process
 
 if TYPE_CHECKING:
+    from rtcomp.control.references import Reference
     from rtcomp.jobs.configuration import Configuration
     from rtcomp.loop.device import Device
 
