@@ -71,6 +71,8 @@ def demo(
             plant = stack.enter_context(PlantProcess(path))
             seconds = seconds or 20.0
             chosen = lasting(load(path, port=plant.port), seconds)
+            # Nothing can be hurt: on a busy machine the plant may be silent for longer than a board may.
+            chosen = chosen.changed(device={**chosen.run.device, "watchdog": 1.0})
         elif seconds is not None:
             chosen = lasting(chosen, seconds)
         titles = ["live", "learn", "judge", "without", "with", "believed", "hidden", "found"]
