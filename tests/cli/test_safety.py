@@ -22,8 +22,9 @@ from rtcomp.recording.reader import read
 
 HARDWARE = """
 import sys
-from rtcomp_drivers import plant_server
-plant_server.PlantServer.__init__.__defaults__ = (0, "stage drive 7")
+from rtcomp_drivers import board, plant_server
+facts = board.BoardFacts
+board.BoardFacts = lambda **given: facts(**{**given, "text": "stage drive 7"})
 plant_server.main(["--config", "plant.yaml", "--serial", "--json", "--log", "plant.json"])
 """
 """The plant server, but for what it says of itself."""
