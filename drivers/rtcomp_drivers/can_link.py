@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, cast
 from pydantic import Field
 
 from rtcomp.errors import ConfigError, DeviceBusyError, DeviceError, nearest
-from rtcomp_drivers.driver import DriverSettings
+from rtcomp_drivers.link_settings import LinkSettings
 from rtcomp_drivers.serial_port import SerialPort
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def _content(message: can.Message) -> _Content:
     return message.arbitration_id, message.is_remote_frame, bytes(message.data)
 
 
-class CanSettings(DriverSettings):
+class CanSettings(LinkSettings):
     """The settings that every CAN driver has."""
 
     interface: str = Field(

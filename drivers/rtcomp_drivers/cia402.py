@@ -58,12 +58,8 @@ class Cia402Driver(Driver):
         """After close: whether the drive confirmed that it is not enabled any more."""
         self.bus_load = settings.check(bench.period)
         """Worst share of the bus that the loop's frames take."""
-        timeout = settings.reply_timeout
-        self._timeout = 0.7 * bench.period if timeout is None else timeout
-        most = settings.max_missed
-        if most is None:  # the host gives up when the drive would: nothing heard for the watchdog's time
-            most = math.ceil(settings.watchdog / max(bench.period, self._timeout) - 1e-9)
-        self.max_missed = most
+        self._timeout = settings.wait(bench.period)
+        self.max_missed = settings.most_missed(bench.period)
         """Samples that may be missing in a row."""
         self._beat_every = settings.beat_every(bench.period)
         self._beat_patience = 3e-3 * settings.heartbeat_ms + self._timeout

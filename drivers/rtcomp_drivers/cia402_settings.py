@@ -42,17 +42,7 @@ class Cia402Settings(CanSettings):
     voltage_limit: float | None = Field(
         None, gt=0.0, le=1e6, description="V, clamped by the drive as torque; without it the stage's"
     )
-    reply_timeout: float | None = Field(
-        None, gt=0.0, le=1.0, description="s to wait for a sample; without it 0.7 of the period"
-    )
-    max_missed: int | None = Field(
-        None,
-        ge=0,
-        le=100_000,
-        description="samples that may be missing in a row; without it as many as the watchdog's time holds",
-    )
     connect_timeout: float = Field(3.0, gt=0.0, le=60.0, description="s for the drive to become enabled")
-    clear_fault: bool = Field(False, description="reset, when opening, a fault of the drive")
 
     def beat_every(self, period: float) -> int:
         """Return after how many ticks of `period` s a heartbeat goes: ten times in the watchdog's time."""
@@ -65,12 +55,7 @@ class Cia402Settings(CanSettings):
 
     def check(self, period: float) -> float:
         """Return the worst share of the bus that a loop of `period` s takes; raise ConfigError at misfits."""
-        if self.watchdog < 3.0 * period:
-            raise ConfigError(
-                f"device: watchdog is {self.watchdog:g} s; it must be at least three periods "
-                f"({3 * period:g} s)",
-                key=("watchdog",),
-            )
+        self.check_watchdog_holds(period, periods=3)
         if self.host_node == self.node:
             raise ConfigError(
                 f"device: host_node is {self.node}, the drive's own node; take another", key=("host_node",)

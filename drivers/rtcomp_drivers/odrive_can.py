@@ -45,9 +45,7 @@ class OdriveDriver(Driver):
         """After close: whether the axis confirmed that it is idle."""
         check_interface(settings)
         rate = 1.0 / bench.period
-        if settings.watchdog < 2.0 * bench.period:
-            least = f"two periods ({2 * bench.period:g} s)"
-            raise ConfigError(f"device: watchdog is {settings.watchdog:g} s; it must be at least {least}")
+        settings.check_watchdog_holds(bench.period)
         if (settings.velocity_limit is None) != (settings.current_limit is None):
             raise ConfigError(
                 "device: velocity_limit and current_limit go out in one frame; give both or none"
@@ -65,11 +63,8 @@ class OdriveDriver(Driver):
             rate,
         )
         """Worst share of the bus's bits that the run takes."""
-        self._timeout = 0.7 * bench.period if settings.reply_timeout is None else settings.reply_timeout
-        most = settings.max_missed
-        if most is None:
-            most = math.ceil(settings.watchdog / max(bench.period, self._timeout) - 1e-9)
-        self.max_missed = most
+        self._timeout = settings.wait(bench.period)
+        self.max_missed = settings.most_missed(bench.period)
         """Positions that may be missing in a row."""
         self._link: OdriveLink | None = None
         self._reset()

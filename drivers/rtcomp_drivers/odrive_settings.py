@@ -42,20 +42,9 @@ class OdriveSettings(CanSettings):
     check_watchdog: bool = Field(
         True, description="prove the watchdog when opening: loop closed at zero torque, then silence"
     )
-    reply_timeout: float | None = Field(
-        None, gt=0.0, le=1.0, description="s to wait for a position; without it 0.7 of the period"
-    )
-    max_missed: int | None = Field(
-        None,
-        ge=0,
-        le=100_000,
-        description="positions that may be missing in a row; without it as many as the watchdog's time holds",
-    )
     heartbeat_timeout: float = Field(
         0.5, ge=0.02, le=10.0, description="s without a heartbeat until the run ends"
     )
-    connect_timeout: float = Field(3.0, ge=0.3, le=60.0, description="s to wait for a first heartbeat")
-    clear_fault: bool = Field(False, description="clear, when opening, errors that the axis has latched")
 
 
 def scales(settings: OdriveSettings, bench: Bench) -> tuple[float, float]:

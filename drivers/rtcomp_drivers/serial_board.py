@@ -8,7 +8,6 @@ import time
 from pydantic import Field
 
 from rtcomp.errors import (
-    ConfigError,
     DeviceBusyError,
     DeviceError,
     DeviceTimeoutError,
@@ -17,7 +16,8 @@ from rtcomp.errors import (
 )
 from rtcomp.loop.device import INVALID, OK, STALE, Sample
 from rtcomp_drivers import protocol
-from rtcomp_drivers.driver import Bench, Driver, DriverSettings, check_volts
+from rtcomp_drivers.driver import Bench, Driver, check_volts
+from rtcomp_drivers.link_settings import LinkSettings
 from rtcomp_drivers.protocol import ARMED, FAULT
 from rtcomp_drivers.serial_link import ASK_AGAIN_S, SerialLink
 
@@ -34,7 +34,7 @@ _COUNTERS = (
 )  # fmt: skip
 
 
-class SerialSettings(DriverSettings):
+class SerialSettings(LinkSettings):
     """Settings of the driver ``serial``."""
 
     port: str = Field(min_length=1, description="path of the port, such as /dev/ttyACM0")
@@ -45,17 +45,7 @@ class SerialSettings(DriverSettings):
     voltage_limit: float | None = Field(
         None, gt=0.0, le=2000.0, description="V, clamped on the board; without it the stage's"
     )
-    reply_timeout: float | None = Field(
-        None, gt=0.0, le=1.0, description="s to wait for a sample; without it 0.7 of the period"
-    )
-    max_missed: int | None = Field(
-        None,
-        ge=0,
-        le=100_000,
-        description="samples that may be missing in a row; without it as many as the watchdog's time holds",
-    )
     connect_timeout: float = Field(3.0, gt=0.0, le=60.0, description="s to wait for a board to answer")
-    clear_fault: bool = Field(False, description="clear, when opening, a fault that the board has latched")
 
 
 class SerialDriver(Driver):
@@ -74,15 +64,9 @@ class SerialDriver(Driver):
         """V, what the board put out when it took the newest sample."""
         self.disarmed: bool | None = None
         """After close: whether the board confirmed that its output is zero."""
-        if settings.watchdog < 2.0 * bench.period:
-            least = f"two periods ({2 * bench.period:g} s)"
-            raise ConfigError(f"device: watchdog is {settings.watchdog:g} s; it must be at least {least}")
-        timeout = settings.reply_timeout
-        self._timeout = 0.7 * bench.period if timeout is None else timeout
-        most = settings.max_missed
-        if most is None:  # the host gives up when the board would: nothing heard for the watchdog's time
-            most = math.ceil(settings.watchdog / max(bench.period, self._timeout) - 1e-9)
-        self.max_missed = most
+        settings.check_watchdog_holds(bench.period)
+        self._timeout = settings.wait(bench.period)
+        self.max_missed = settings.most_missed(bench.period)
         """Samples that may be missing in a row."""
         self._link: SerialLink | None = None
         self._reset()

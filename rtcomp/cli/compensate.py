@@ -94,3 +94,6 @@ def compensate(
             out, work, chosen, "compensated", compensated_rows(done), done.summary(), compensated_page(done),
             as_json,
         )  # fmt: skip
+        if not as_json:
+            for note in done.notes:
+                click.echo(f"Note: {note}")

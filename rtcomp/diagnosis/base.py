@@ -82,20 +82,20 @@ def fit_base(
 ) -> Fitted:
     """Refit the believed stage, with `effects` at work, on the grid of reaches that predicts best."""
     best: Fitted | None = None
+    given = list(effects or [])
+    names = [e.name for e in given]
+    whole, play = any(name in WHOLE for name in names), "backlash" in names
     known = [e for e in map(physics.build, stage.mechanics.effects) if e.place is not physics.Place.DRIVE]
     for scale in scales:
         ledger = Ledger(stage, motion, grid_of(stage, scale), known)
-        # What asks for the whole of friction is given first the fit without it, then the one with it.
-        names = {e.name for e in effects or ()}
-        rounds = 3 if names & set(WHOLE) else 1
-        # What hangs behind a play carries the friction that is found with it.
-        rounds = max(rounds, 2 if "backlash" in names else 1)
-        for i in range(rounds):
-            system = ledger.system((effects or []) if i or not names & set(WHOLE) else [])
-            bounds = bounds_of(stage, system.columns.shape[1], names=[e.name for e in effects or ()])
+        # What asks for the whole of friction is given first the fit without it, then the one with it; what
+        # hangs behind a play first the believed friction, then the one found with it.
+        for at_work in [[], given, given] if whole else [given, given] if play else [given]:
+            system = ledger.system(at_work)
+            bounds = bounds_of(stage, system.columns.shape[1], names=names)
             found = system.blocks.coefficients(ledger.seen, bounds)
             ledger.weigh(found[FIXED : FIXED + ledger.reaches.size])
-            ledger.found_with_play = "backlash" in names
+            ledger.found_with_play = play and bool(at_work)
         errors = system.blocks.left_out(ledger.seen, bounds)
         if best is None or errors.sum() < best.errors.sum():
             best = Fitted(ledger, system, bounds, errors, scale)

@@ -41,12 +41,13 @@ def permit(config: Configuration, device: Device, start: float, reference: Refer
         return
     asked = config.arming
     who = getattr(device, "who", None) or f"the device of the driver {config.run.device.get('driver')}"
+    said = "".join(f"; {remark}" for remark in getattr(device, "remarks", ()))
     if not asked.armed:
         before = ", after reversals that die out" if config.run.relax is not None else ""
         raise NotArmedError(
             f"{who} is ready and stands at {start:.6g} {_unit(config)}; it would follow its reference for "
-            f"{reference.duration:g} s within {config.voltage_limit:g} V{before}; nothing was armed: see "
-            "that the axis may move, then give --armed"
+            f"{reference.duration:g} s within {config.voltage_limit:g} V{before}{said}; nothing was armed: "
+            "see that the axis may move, then give --armed"
         )
     with realtime_process() as granted:
         missing = not_real_time(granted)

@@ -49,6 +49,11 @@ class Compensated:
         """Rms tracking error without over with."""
         return self.error_without.rms / self.error_with.rms
 
+    @property
+    def notes(self) -> list[str]:
+        """What the device said of itself in either run."""
+        return list(dict.fromkeys([*self.without.remarks, *self.with_it.remarks]))
+
     def summary(self) -> dict[str, Any]:
         """Return the figures, for `--json` and the result file."""
         return {
@@ -62,6 +67,7 @@ class Compensated:
             "slots_lost": self.without.outcome.lost + self.with_it.outcome.lost,
             "degraded": self.without.outcome.degraded + self.with_it.outcome.degraded,
             "stopped_by": self.with_it.outcome.stopped_by,
+            "notes": self.notes,
         }
 
 

@@ -25,10 +25,8 @@ from rtcomp.stage.stage import Stage
 SAME_MODEL = 0.02
 """Share of the largest force by which the virgin curves of two links may differ."""
 
-RECOVERY_S = 1.5
-"""s after DEGRADED until the integral has given back what it took over from the feedforward, as measured."""
-FEEDBACK_S = 0.3
-"""s after a missed slot until feedback alone has made up for it."""
+RECOVERY_S = 0.3
+"""s after a lost slot or DEGRADED until feedforward has faded back and feedback has made up for it."""
 LEAST_KEPT = 0.2
 """Share of a run, with deadlines kept for so long, from which it is judged."""
 ATTEMPTS = 3
@@ -60,15 +58,15 @@ class Tracked:
     def kept(self) -> tuple[float, float]:
         """Rms tracking error without over with, and the share of the rows that it is of: the same in both.
 
-        Left out is what follows missed deadlines in the run with feedforward, which judges the machine; and
-        of the run without what follows them there, which would flatter.
+        Left out is what follows missed deadlines in the run with feedforward, which judges the machine; of
+        the run without also what follows them there, which would flatter.
         """
         without, with_it = self.compensated.without, self.compensated.with_it
         counts = with_it.columns["time"] >= self.compensated.config.run.compensate.settle
-        good = counts & undisturbed(with_it, RECOVERY_S)
+        good = counts & undisturbed(with_it)
         rms = []
-        for run, more in ((without, undisturbed(without, FEEDBACK_S)), (with_it, good)):
-            rows = good & more & run.measured
+        for run in (without, with_it):
+            rows = good & undisturbed(run) & run.measured
             error = (run.columns["reference"] - run.columns["position"])[rows]
             rms.append(float(np.sqrt(np.mean(error**2))) if error.size else np.nan)
         return rms[0] / rms[1], int(good.sum()) / max(1, int(counts.sum()))
@@ -214,10 +212,10 @@ def difference(one: HysteresisModel, other: HysteresisModel) -> float:
     return float(np.max(np.abs(theirs - ours)) / np.max(np.abs(ours)))
 
 
-def undisturbed(run: Run, seconds: float) -> npt.NDArray[np.bool_]:
-    """Return the rows (K,) of a run in which deadlines were kept, and had been for so long."""
+def undisturbed(run: Run) -> npt.NDArray[np.bool_]:
+    """Return the rows (K,) of a run in which deadlines were kept, and had been for `RECOVERY_S`."""
     bad = (run.columns["overrun"] == 2) | (run.columns["state"] == State.DEGRADED)
-    reach = round(seconds * run.rate_hz)
+    reach = round(RECOVERY_S * run.rate_hz)
     return np.asarray(np.convolve(bad, np.ones(reach + 1))[: len(bad)] < 0.5)
 
 

@@ -99,7 +99,7 @@ def identify(
     settle = min(settle, 0.5 * float(learned.columns["time"][-1]))
     in_sample = judge(model, own, settle=settle)
     held_out, on, number = None, own, None
-    notes = never_reached(model)
+    notes = [*learned.remarks, *never_reached(model)]
     unjudged = "the model was not judged on other motion"
     if learned.outcome.stopped_by == "signal":
         number = learned.signal

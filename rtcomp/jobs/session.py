@@ -74,6 +74,8 @@ class Run:
     rate_hz: float
     realtime: Mapping[str, str]
     counters: Mapping[str, int] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+    """What a person should know of the device before relying on it."""
     recorder: RecorderSummary | None = None
     signal: int = SIGINT
     """The signal that stopped it, where ``outcome.stopped_by`` says that one did."""
@@ -243,6 +245,7 @@ def run_loop(
     if outcome.stopped_by == "signal" and not (partial and outcome.ticks >= LEAST_TICKS):
         raise Interrupted(stop.number, stopped(outcome.ticks * config.period, tick.closed_loop))
     counters = dict(getattr(device, "counters", {}))
+    remarks = tuple(getattr(device, "remarks", ()))
     delay = device.delay_ticks
     if path is None:
         every = max(1, math.ceil(WEIGHTS_EVERY * config.stage.rate - 1e-6))  # as a recording holds them
@@ -250,12 +253,12 @@ def run_loop(
         history = rows[::every]
         return Run(
             recorded, history[:, 0].copy(), history[:, len(columns) :].copy(), outcome, tick, delay,
-            config.stage.rate, in_loop, counters, signal=stop.number,
+            config.stage.rate, in_loop, counters, remarks, signal=stop.number,
         )  # fmt: skip
     recorded, times, weights = read_back(path, columns)
     return Run(
-        recorded, times, weights, outcome, tick, delay, config.stage.rate, in_loop, counters, summary,
-        stop.number,
+        recorded, times, weights, outcome, tick, delay, config.stage.rate, in_loop, counters, remarks,
+        summary, stop.number,
     )  # fmt: skip
 
 

@@ -172,6 +172,7 @@ def compensated_page(done: Compensated) -> Page:
         if better > 1
         else f"Feedforward of this model made the tracking error {1 / better:.2g} times larger (rms).",
         summary=compensated_rows(done),
+        notes=done.notes,
         sections=[
             tracking_section(done),
             *_motion_sections(done.with_it, done.config),

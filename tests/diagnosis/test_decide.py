@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtcomp.diagnosis.decide import _settles_the_rest
-from rtcomp.diagnosis.explain import LEAST, MUCH, _explains_little
+from rtcomp.diagnosis.decide import _settles_the_rest, _worth_it
+from rtcomp.diagnosis.explain import LEAST, MUCH, _explains_little, _leaves_much
 from rtcomp.diagnosis.result import Fit
 from rtcomp.kernels import Floats
 
@@ -44,3 +44,23 @@ def test_names_that_leave_much_must_explain_most_of_what_was_put_aside() -> None
     assert not _explains_little(most, MUCH)
     nothing_to_explain = Fit(0.006, 0.006, 0.006, 0.005)
     assert not _explains_little(nothing_to_explain, MUCH)
+
+
+@pytest.mark.parametrize(
+    ("fit", "much"),
+    [
+        (Fit(0.8, 0.50, 0.15, 0.002), True),  # nine tenths, and 75 floors left: the nearest name
+        (Fit(0.3, 0.09, 0.021, 0.009), False),  # near the floor: the name's form is not quite the axis's
+        (Fit(0.9, 0.73, 0.12, 0.0015), False),  # so large that what is left is trimming
+    ],
+)
+def test_a_lone_name_must_not_leave_far_more_than_noise(fit: Fit, much: bool) -> None:
+    assert _leaves_much(fit) is much
+
+
+def test_a_small_gain_counts_where_nearly_every_block_has_it() -> None:
+    floor, before = even(1.0), even(1.8)
+    assert _worth_it(before, before - even(0.55), floor)
+    # The same gain, had in a third of the blocks only, may be an accident of the floor.
+    few = np.where(np.arange(BLOCKS) % 3 == 0, 0.55 * 3 / BLOCKS, 0.0)
+    assert not _worth_it(before, before - few, floor)

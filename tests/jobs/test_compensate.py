@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rtcomp_drivers.simulated import SimulatedDriver
 
 from rtcomp.errors import RecordingError
 from rtcomp.hysteresis.model import HysteresisModel
@@ -38,6 +39,17 @@ def test_the_tracking_error_falls_at_least_twentyfold(leuven, identified, delay)
     assert done.model is identified.model
     for run in (done.without, done.with_it):
         assert run.outcome.ticks == 6000 and run.delay_ticks == delay
+
+
+def test_what_a_device_says_of_itself_is_passed_on(leuven, identified, monkeypatch):
+    class Loose(SimulatedDriver):
+        def open(self):
+            super().open()
+            self.remarks = ["runs without watchdog"]
+
+    monkeypatch.setattr("rtcomp_drivers.simulated.SimulatedDriver", Loose)
+    done = compensate(leuven.changed(compensate={"reference": {**BRIEF, "duration": 2.0}}), identified.model)
+    assert done.notes == done.summary()["notes"] == ["runs without watchdog"]
 
 
 def test_a_lost_slot_costs_moments_not_seconds(leuven, identified):

@@ -1,0 +1,54 @@
+"""Where a search for missing physics starts, and what the first look keeps of it."""
+
+from __future__ import annotations
+
+import pytest
+from recorded import run, stage, there_and_back
+
+from rtcomp.diagnosis.base import fit_base
+from rtcomp.diagnosis.certain import intervals
+from rtcomp.diagnosis.diagnose import diagnose
+from rtcomp.diagnosis.motion import prepare
+from rtcomp.diagnosis.refine import refine
+from rtcomp.diagnosis.scene import Scene
+from rtcomp.diagnosis.screen import screen
+from rtcomp.diagnosis.search_at_work import _ringing
+
+
+def scene(*effects: dict[str, object]) -> Scene:
+    """What a recording of the stage with `effects` offers to one that does not know of them."""
+    motion = prepare(stage(), [run(stage(effects=list(effects)), there_and_back(12.0))])
+    return Scene.of(motion, fit_base(stage(), motion))
+
+
+def test_a_small_second_mass_is_looked_for_where_it_rings() -> None:
+    found = _ringing(scene({"name": "resonance", "frequency": 17.0, "damping": 0.03, "mass_ratio": 0.03}))
+    assert found[0] == pytest.approx(17.0, rel=0.06)
+
+
+def test_a_first_look_keeps_every_form() -> None:
+    looked = {s.name: s for s in screen(scene({"name": "constant-force", "force": 0.3}), [])}
+    for name in ("stribeck", "frictional-lag", "stiction-ageing", "load-dependent-friction"):
+        both = [looked[name].entry, *looked[name].forms]
+        assert sorted(bool(entry.get("following")) for entry in both) == [False, True]
+    assert {"contact" in e for e in (looked["backlash"].entry, *looked["backlash"].forms)} == {False, True}
+
+
+def test_an_interval_ends_where_its_parameter_does() -> None:
+    motion = prepare(stage(), [run(stage(), there_and_back(6.0))])
+    entry = {"name": "load-dependent-friction", "coefficient": 1e-3, "following": 1.0, "stiffening": 0.5}
+    spans = intervals(refine(fit_base(stage(), motion), motion, [entry], tries=1), [], worse=50.0)
+    assert spans[0, "stiffening"] == (0.0, 1.0)
+    assert spans[0, "coefficient"][0] == 0.0
+
+
+@pytest.mark.slow
+def test_cogging_with_a_harmonic_is_cogging_and_no_free_curve() -> None:
+    waves = [
+        {"name": "cogging", "amplitude": 0.4, "period": 4e-5, "phase": 0.7},
+        {"name": "cogging", "amplitude": 0.12, "period": 2e-5, "phase": 2.0},
+    ]
+    found = diagnose(stage(), [run(stage(effects=waves), there_and_back(20.0))])
+    assert [e.names[0] for e in found.effects] == ["cogging"]
+    assert found.effects[0].parameters["period"].value == pytest.approx(4e-5, rel=0.02)
+    assert found.fit.after < 0.5 * found.fit.retuned
