@@ -14,10 +14,11 @@ WAITED = 0.7
 
 
 class LinkSettings(DriverSettings):
-    """The settings that every link has. A driver says what its device's watchdog is."""
+    """The settings that every link has; a driver whose device means another silence says so."""
 
-    watchdog: float
-    """s of silence after which the device zeroes its output by itself."""
+    watchdog: float = Field(
+        0.1, ge=0.002, le=10.0, description="s without a command until the device zeroes its output"
+    )
     reply_timeout: float | None = Field(
         None, gt=0.0, le=1.0, description="s to wait for a sample; without it 0.7 of the period"
     )

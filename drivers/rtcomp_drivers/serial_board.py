@@ -39,9 +39,6 @@ class SerialSettings(LinkSettings):
 
     port: str = Field(min_length=1, description="path of the port, such as /dev/ttyACM0")
     baudrate: int = Field(1_000_000, ge=9600, le=12_000_000, description="means nothing on USB and ptys")
-    watchdog: float = Field(
-        0.1, ge=0.002, le=10.0, description="s without a command until the board zeroes its output"
-    )
     voltage_limit: float | None = Field(
         None, gt=0.0, le=2000.0, description="V, clamped on the board; without it the stage's"
     )
