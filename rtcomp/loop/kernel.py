@@ -123,6 +123,28 @@ def put_aside(i: Identifier, state: Floats) -> None:
 
 
 @compiled
+def hand_over(c: Compensator, state: Floats, wanted: float) -> float:
+    """Return the integral (V) that goes with the share of feedforward: without a jump, and back again.
+
+    As feedforward goes off at once, the integral takes over what it gave. As it fades back, the integral
+    gives up what it has gained since, no more: in a short gap feedback has carried little of the friction.
+    """
+    integral, share, last = c.pid_s[INTEGRAL], state[at.SHARE], state[at.LAST_SHARE]
+    if share == 0.0 and last > 0.0:
+        state[at.OWN] = integral - state[at.CARRIED]
+        state[at.CARRIED] = 0.0
+        integral += state[at.HANDED]
+    elif share > last and wanted > 0.0:
+        if last == 0.0:
+            state[at.CARRIED] = integral - state[at.OWN]
+        part = state[at.CARRIED] * (share - last) / (1.0 - last)
+        state[at.CARRIED] -= part
+        integral -= part
+    most = c.pid_p[INTEGRAL_LIMIT]
+    return min(max(integral, -most), most)
+
+
+@compiled
 def stop_at_zero(c: Compensator, state: Floats, row: Floats, header: np.ndarray, rows: Floats) -> float:
     """Write the row of a tick that found a fault: zero volts, whatever the slew limit."""
     c.limit_s[0] = 0.0
@@ -178,7 +200,6 @@ def tick_kernel(
         state[at.GOOD] = 0.0
     # Where the device sets the pace, a tick is late when its sample did not come, not when the host was.
     late = (not fresh) if settings[at.DEVICE_PACED] > 0.0 else row[at.ROW_LATENESS] > settings[at.LATE_US]
-    share_before = state[at.SHARE]
     keep_pace(state, 1 if late else 0)
     row[at.ROW_STATE] = state[at.MODE]
     state[at.X2] = state[at.X1]
@@ -194,16 +215,10 @@ def tick_kernel(
         put_aside(i, state)
         degrade(state)
         row[at.ROW_STATE] = state[at.MODE]
-    if state[at.SHARE] == 0.0 and state[at.HANDED] != 0.0 and c.pid_p[KI] > 0.0:
-        # Feedforward goes off at once and without a jump: the integral takes over what it gave.
-        most = c.pid_p[INTEGRAL_LIMIT]
-        c.pid_s[INTEGRAL] = min(max(c.pid_s[INTEGRAL] + state[at.HANDED], -most), most)
     full = plan[at.FEEDFORWARD] * (plan[at.LEAD_FORCE] + lead) / settings[at.FORCE_CONSTANT]
-    back = state[at.SHARE] - share_before
-    if back > 0.0 and c.pid_p[KI] > 0.0:
-        # As it fades back the integral, which has carried the friction meanwhile, gives up as much.
-        most = c.pid_p[INTEGRAL_LIMIT]
-        c.pid_s[INTEGRAL] = min(max(c.pid_s[INTEGRAL] - back * full, -most), most)
+    if closed and c.pid_p[KI] > 0.0:
+        c.pid_s[INTEGRAL] = hand_over(c, state, plan[at.FEEDFORWARD])
+    state[at.LAST_SHARE] = state[at.SHARE]
     feedback = plan[at.VOLTS]
     if closed:
         error = plan[at.REFERENCE] - position

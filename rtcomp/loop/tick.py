@@ -135,7 +135,7 @@ class Tick:
         )  # fmt: skip
         self.state: Floats = np.zeros(at.HISTORY + s.delay_ticks + 3)
         self.state[at.MODE] = State.CONNECTED
-        self.state[at.SHARE] = 1.0
+        self.state[at.SHARE] = self.state[at.LAST_SHARE] = 1.0
         self.state[[at.MEASURED_AT, at.MEASURED_SPEED]] = math.nan
         self.row: Floats = np.zeros(len(COLUMNS) + n + 1)
 

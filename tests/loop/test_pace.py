@@ -76,13 +76,24 @@ def test_feedforward_goes_and_comes_back_without_a_jump():
     feedforward = np.abs(quiet.column("feedforward")[380:460]).max()
     assert feedforward > 10 * usual  # cut off, it would have jumped by so much
     assert steps[395:].max() < 3 * usual
-    back = left.column("feedforward")[434 : 434 + 140] / quiet.column("feedforward")[434 : 434 + 140]
+    back = left.column("feedforward")[434 : 434 + 40] / quiet.column("feedforward")[434 : 434 + 40]
     assert (
         np.all(np.diff(back) > -1e-9) and back[0] == pytest.approx(at.FADE) and back[-1] == pytest.approx(1.0)
     )
     error = np.abs(left.column("reference") - left.column("position"))
     usual = np.abs(quiet.column("reference") - quiet.column("position"))
     assert error[1500:].max() < 2 * usual[1500:].max()
+
+
+def test_a_gap_spoils_the_moment_of_the_gap_and_not_what_follows():
+    """Slots lost anywhere in the motion, at reversals too: the integral gives back what it took, no more."""
+    gaps = {400 + 131 * k: 1.2e-3 for k in range(70)}
+    left = compensated(gaps, 10000)
+    feedback_alone = go(device(stage()), tick(weights=RIGHT), plan(10000, learn=False))
+    assert left.outcome.degraded == len(gaps)
+    errors = [of.column("reference") - of.column("position") for of in (left, feedback_alone)]
+    with_gaps, alone = (np.sqrt(np.mean(error[400:] ** 2)) for error in errors)
+    assert with_gaps < 0.3 * alone, (with_gaps, alone)
 
 
 @pytest.mark.parametrize("at_once", [True, False])
