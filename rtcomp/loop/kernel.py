@@ -141,7 +141,7 @@ def hand_over(c: Compensator, state: Floats, wanted: float) -> float:
         state[at.CARRIED] -= part
         integral -= part
     most = c.pid_p[INTEGRAL_LIMIT]
-    return min(max(integral, -most), most)
+    return float(min(max(integral, -most), most))
 
 
 @compiled

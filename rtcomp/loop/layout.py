@@ -41,7 +41,8 @@ which a tick is late, slots lost until a fault, 1 where the device sets the pace
 not believed."""
 (
     GOOD, X1, X2, LAST_REFERENCE, LEARNED_AT, EXCESS, FAULT, COMPUTED, UPDATES, STARTED,
-    MODE, SHARE, LAST_SHARE, HANDED, OWN, CARRIED, LATE_RUN, LATE_BITS, LATE_SUM, CLEAN, LOST, HELD, DIVERGED, DEGRADED_TIMES,
+    MODE, SHARE, LAST_SHARE, HANDED, OWN, CARRIED,
+    LATE_RUN, LATE_BITS, LATE_SUM, CLEAN, LOST, HELD, DIVERGED, DEGRADED_TIMES,
     AGE, INVALID_RUN, REPEATED_RUN, REPEATED, LAST_SEQUENCE, LAST_TIME,
     MEASURED_AT, MEASURED_SPEED, SINCE, RESTED, RESTED_AT, STUCK_RUN, STUCK_AT, PUSHED, PUSHED_AT,
     PUSHED_MID, HISTORY,
@@ -50,11 +51,11 @@ not believed."""
 position at the last update (m); what the limits cut from the last command (V); what the check found;
 execution time of the last tick (us); updates of the weights; whether there was a sample.
 
-Of the states and the pace: `states.State`; share of the feedforward that the state lets through,
-now and one tick ago; the feedforward of the last tick (V); the integral when feedforward went off (V), and
-what it carries in feedforward's place and has not given back (V); late ticks in a row; the last 32 ticks, a bit each, and how many were late;
-ticks in time in a row; slots lost and not forgiven; ticks until a diverged identifier may go on; how often it
-diverged; how often degraded.
+Of the states and the pace: `states.State`; share of the feedforward that the state lets through, now and one
+tick ago; the feedforward of the last tick (V); the integral's own part when feedforward went off (V), and what
+it carries in feedforward's place and has not given back (V); late ticks in a row; the last 32 ticks, a bit
+each, and how many were late; ticks in time in a row; slots lost and not forgiven; ticks until a diverged
+identifier may go on; how often it diverged; how often degraded.
 
 Of the checks: ticks since a sample was new; without a valid position; with a sample that was not new, in a
 row and in all; the last sequence and device time; the last measured position (m), the speed there (m a tick),
