@@ -52,9 +52,9 @@ position at the last update (m); what the limits cut from the last command (V); 
 execution time of the last tick (us); updates of the weights; whether there was a sample.
 
 Of the states and the pace: `states.State`; share of the feedforward that the state lets through, now and one
-tick ago; the feedforward of the last tick (V); the integral's own part when feedforward went off (V), and what
-it carries in feedforward's place and has not given back (V); late ticks in a row; the last 32 ticks, a bit
-each, and how many were late; ticks in time in a row; slots lost and not forgiven; ticks until a diverged
+tick ago; the feedforward of the last tick (V); the integral's own part when feedforward went off (V), and
+what it carries in feedforward's place and has not given back (V); late ticks in a row; the last 32 ticks, a
+bit each, and how many were late; ticks in time in a row; slots lost and not forgiven; ticks until a diverged
 identifier may go on; how often it diverged; how often degraded.
 
 Of the checks: ticks since a sample was new; without a valid position; with a sample that was not new, in a
