@@ -10,6 +10,7 @@ import tty
 
 import pytest
 import yaml
+from free_mass import FreeMass
 from rtcomp_drivers.board import Board, BoardFacts
 from rtcomp_drivers.plant_process import PlantProcess
 
@@ -44,20 +45,6 @@ def stage(stage_file):
 def plant(stage_file):
     with PlantProcess(stage_file) as process:
         yield process
-
-
-class FreeMass:
-    """1 kg, 1 N/V, no friction."""
-
-    def __init__(self):
-        self.position = self.velocity = 0.0
-
-    def advance(self, volts, seconds):
-        self.position += self.velocity * seconds + 0.5 * volts * seconds**2
-        self.velocity += volts * seconds
-
-    def measure(self):
-        return self.position
 
 
 class PtyBoard:

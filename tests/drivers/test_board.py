@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from free_mass import FreeMass
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rtcomp_drivers import protocol
@@ -15,29 +16,26 @@ WATCHDOG_S = 0.05
 LIMIT_V = 5.0
 
 
-class FreeMass:
-    """1 kg, 1 N/V, no friction: position after each stretch is known exactly. Remembers what it got."""
+class RememberingMass(FreeMass):
+    """Also remembers what it got: begin, end, volts of each stretch."""
 
     def __init__(self):
-        self.time = self.position = self.velocity = 0.0
+        super().__init__()
+        self.time = 0.0
         self.stretches: list[tuple[float, float, float]] = []
 
     def advance(self, volts, seconds):
         assert seconds > 0.0
-        self.position += self.velocity * seconds + 0.5 * volts * seconds**2
-        self.velocity += volts * seconds
+        super().advance(volts, seconds)
         self.stretches.append((self.time, self.time + seconds, volts))
         self.time += seconds
-
-    def measure(self):
-        return self.position
 
 
 class Rig:
     """A board with a host that speaks its bytes."""
 
     def __init__(self, **facts):
-        self.plant = FreeMass()
+        self.plant = RememberingMass()
         self.board = Board(self.plant, BoardFacts(voltage_limit=10.0, **facts))
         self.decoder = protocol.Decoder()
         self.now = 0.0

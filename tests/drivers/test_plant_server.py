@@ -12,6 +12,7 @@ import time
 
 import pytest
 import yaml
+from pushing_host import pushing
 from rtcomp_drivers.driver import Bench
 from rtcomp_drivers.plant_process import PlantProcess
 from rtcomp_drivers.registry import create
@@ -22,36 +23,13 @@ WATCHDOG_S = 0.1
 SLACK_S = 0.25
 """For processes that wait for a processor on a busy machine; the board's own clock knows none."""
 
-HOST = """
-import sys, time
-from rtcomp_drivers.driver import Bench
-from rtcomp_drivers.registry import create
-device = create({"driver": "serial", "port": sys.argv[1], "watchdog": float(sys.argv[2]),
-                 "reply_timeout": 0.05, "max_missed": 100000}, Bench(period=1e-3))
-device.open()
-try:
-    for k in range(1000000):
-        device.exchange(1.0)
-        if k == 50:
-            print("running", flush=True)
-        time.sleep(1e-3)
-finally:
-    device.close()
-"""
-
 
 @pytest.fixture
 def host(plant):
     """A loop in another process, pushing the stage with 1 V at about 1 kHz."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", HOST, plant.port, str(WATCHDOG_S)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
-    assert process.stdout.readline() == b"running\n"
-    yield process
-    process.kill()
-    process.communicate()
+    settings = {"driver": "serial", "port": plant.port, "watchdog": WATCHDOG_S}
+    with pushing(reply_timeout=0.05, max_missed=100_000, **settings) as process:
+        yield process
 
 
 def connect(plant, **settings):

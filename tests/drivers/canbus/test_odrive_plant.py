@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import random
 import signal
-import subprocess
-import sys
 import time
 
 import pytest
+from pushing_host import pushing
 from rtcomp_drivers.driver import Bench
 from rtcomp_drivers.plant_process import PlantProcess
 from rtcomp_drivers.registry import create
@@ -22,25 +20,6 @@ WATCHDOG_S = 0.1
 SLACK_S = 0.25
 """For processes that wait for a processor on a busy machine; the axis' own clock knows none."""
 LEAD = 1e-3
-HOST = """
-import sys, time
-from pathlib import Path
-from rtcomp_drivers.driver import Bench
-from rtcomp_drivers.registry import create
-from rtcomp.stage.stage import Stage
-settings = {"driver": "odrive-can", "interface": "slcan", "channel": sys.argv[1], "lead": 1e-3,
-            "reply_timeout": 0.05, "max_missed": 100000, "clear_fault": True}
-device = create(settings, Bench(stage=Stage.load(Path(sys.argv[2])), period=1e-3))
-device.open()
-try:
-    for k in range(1000000):
-        device.exchange(1.0)
-        if k == 50:
-            print("running", flush=True)
-        time.sleep(1e-3)
-finally:
-    device.close()
-"""
 
 
 @pytest.fixture
@@ -54,19 +33,10 @@ def connect(plant, stage, **settings):
     return create({"driver": "odrive-can", **settings}, Bench(stage=stage, period=1e-3))
 
 
-def start_host(plant, stage_file):
-    """A loop in another process that pushes the stage; one that this machine starves is started again."""
-    for _ in range(10):
-        process = subprocess.Popen(
-            [sys.executable, "-c", HOST, plant.port, str(stage_file)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-        )
-        if process.stdout.readline() == b"running\n":
-            return process
-        _, said = process.communicate()
-        assert b"DeviceError" in said or b"DeviceTimeoutError" in said, said.decode()
-    raise AssertionError(said.decode())
+def host(plant, stage_file):
+    """A loop in another process, pushing the stage with 1 V at about 1 kHz."""
+    settings = {"driver": "odrive-can", "interface": "slcan", "channel": plant.port, "lead": LEAD}
+    return pushing(stage_file, reply_timeout=0.05, max_missed=100_000, clear_fault=True, **settings)
 
 
 def test_it_is_the_stage_of_the_file(stage_file, stage):
@@ -95,14 +65,12 @@ def test_killed_or_stopped_at_any_moment_the_host_leaves_a_zero_output(stage_fil
     gone = []
     with PlantProcess(stage_file, link="odrive-can") as plant:
         for k in range(moments):
-            host = start_host(plant, stage_file)
-            running = time.monotonic()
-            time.sleep(0.2 * noise.random())
-            host.send_signal(signal.SIGSTOP if k % 2 else signal.SIGKILL)
-            gone.append((running, time.monotonic()))
-            time.sleep(WATCHDOG_S + SLACK_S)
-            host.kill()
-            host.communicate()
+            with host(plant, stage_file) as process:
+                running = time.monotonic()
+                time.sleep(0.2 * noise.random())
+                process.send_signal(signal.SIGSTOP if k % 2 else signal.SIGKILL)
+                gone.append((running, time.monotonic()))
+                time.sleep(WATCHDOG_S + SLACK_S)
         with connect(plant, stage, clear_fault=True) as device:
             assert any("WATCHDOG_TIMER_EXPIRED" in r for r in device.remarks)
             assert device.output == 0.0
@@ -119,27 +87,27 @@ def test_killed_or_stopped_at_any_moment_the_host_leaves_a_zero_output(stage_fil
 
 
 def test_a_host_that_goes_on_after_its_watchdog_gets_no_say(plant, stage_file):
-    host = start_host(plant, stage_file)
-    host.send_signal(signal.SIGSTOP)
-    time.sleep(WATCHDOG_S + SLACK_S)
-    host.send_signal(signal.SIGCONT)
-    _, errors = host.communicate(timeout=20)
-    assert host.returncode != 0
+    with host(plant, stage_file) as process:
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(WATCHDOG_S + SLACK_S)
+        process.send_signal(signal.SIGCONT)
+        _, errors = process.communicate(timeout=20)
+    assert process.returncode != 0
     assert b"WATCHDOG_TIMER_EXPIRED" in errors
     assert {z["cause"] for z in plant.stop()["zeroings"]} == {"watchdog"}
 
 
 def test_a_host_that_is_interrupted_leaves_in_order(plant, stage_file):
-    host = start_host(plant, stage_file)
-    host.send_signal(signal.SIGINT)
-    host.communicate(timeout=20)
+    with host(plant, stage_file) as process:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=20)
     assert plant.stop()["zeroings"][-1]["cause"] == "disarmed"
 
 
 def test_a_plant_that_dies_ends_the_host_by_an_error(plant, stage):
     with connect(plant, stage) as device:
         device.exchange(0.5)
-        os.kill(plant.pid, signal.SIGKILL)
+        plant.kill()
         with pytest.raises(DeviceError):
             for _ in range(200):
                 device.exchange(0.5)

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import replace
 from pathlib import Path
 
-import can
 import numpy as np
 import pytest
+from plugged_link import PluggedLink
 from rtcomp_drivers import odrive_link
 from rtcomp_drivers.cansimple import Command
 from rtcomp_drivers.odrive_axis import odrive_side
-from rtcomp_drivers.slcan import Frame
 from rtcomp_drivers.warm_stage import warm
 
 from rtcomp.jobs.compensate import compensate
@@ -21,36 +19,10 @@ from rtcomp.jobs.identify import identify
 from rtcomp.stage.stage import Stage
 
 CONFIGS = Path(__file__).resolve().parents[3] / "configs"
-PERIOD = 1e-3
 
 
-class Plugged:
-    """A link with the axis at its other end. A period passes with each request, and time while one waits."""
-
-    who, bitrate = "CAN interface in virtual time", 1_000_000
-    damaged, error_frames, latency_timer_ms = 0, 0, None
-
-    def __init__(self, axis):
-        self._axis = axis
-        self._received = deque()
-
-    def send(self, message):
-        if message.is_remote_frame and message.arbitration_id & 31 == Command.ENCODER_ESTIMATES:
-            self._received += self._axis.run_until(self._axis.time + PERIOD)
-        frame = Frame(message.arbitration_id, bytes(message.data), message.is_remote_frame)
-        self._received += self._axis.receive([frame], self._axis.time)
-
-    def receive(self, seconds):
-        end = self._axis.time + seconds
-        while not self._received and self._axis.time + PERIOD < end:
-            self._received += self._axis.run_until(self._axis.time + PERIOD)
-        if not self._received:
-            return None
-        frame = self._received.popleft()
-        return can.Message(arbitration_id=frame.identifier, data=frame.data, is_extended_id=False)
-
-    def close(self):
-        pass
+def asks(message):
+    return message.is_remote_frame and message.arbitration_id & 31 == Command.ENCODER_ESTIMATES
 
 
 @pytest.fixture
@@ -58,7 +30,7 @@ def plugged(monkeypatch):
     """The Leuven stage on an axis; the ready configuration, in virtual time, runs on it."""
     stage = Stage.load(CONFIGS / "leuven.yaml")
     axis = odrive_side(warm(stage, 0), stage).axis
-    monkeypatch.setattr(odrive_link, "CanLink", lambda settings: Plugged(axis))
+    monkeypatch.setattr(odrive_link, "CanLink", lambda settings: PluggedLink(axis, asks, waits=True))
     return axis, Configuration.load(CONFIGS / "odrive_can.yaml").changed(clock="virtual")
 
 

@@ -10,6 +10,7 @@ import time
 import can
 import canopen
 from canopen.profiles.p402 import State402
+from free_mass import FreeMass
 from rtcomp_drivers.cia402_axis import Cia402Axis
 from rtcomp_drivers.cia402_memory import AxisFacts
 from rtcomp_drivers.slcan import Frame
@@ -20,20 +21,6 @@ _NUMBER = itertools.count()
 def channel():
     """The name of a bus that nobody else has."""
     return f"cia402-{next(_NUMBER)}"
-
-
-class FreeMass:
-    """1 kg, 1 N/V, no friction."""
-
-    def __init__(self, position=0.0):
-        self.position, self.velocity = position, 0.0
-
-    def advance(self, volts, seconds):
-        self.position += self.velocity * seconds + 0.5 * volts * seconds**2
-        self.velocity += volts * seconds
-
-    def measure(self):
-        return self.position
 
 
 class AxisOnBus:

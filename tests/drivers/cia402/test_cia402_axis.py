@@ -7,7 +7,7 @@ import struct
 
 import numpy as np
 import pytest
-from drives_on_a_bus import FreeMass
+from free_mass import FreeMass
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rtcomp_drivers.cia402_axis import Cia402Axis

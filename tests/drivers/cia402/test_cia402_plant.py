@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import random
 import signal
-import subprocess
-import sys
 import threading
 import time
 
 import pytest
-import yaml
+from pushing_host import pushing
 from rtcomp_drivers.cia402_states import State
 from rtcomp_drivers.driver import Bench
 from rtcomp_drivers.plant_process import PlantProcess
@@ -18,89 +16,49 @@ from rtcomp_drivers.registry import create
 
 from rtcomp.errors import DeviceError, DeviceTimeoutError
 from rtcomp.loop.device import OK
-from rtcomp.stage.stage import Stage
 
 WATCHDOG_S = 0.1
 SLACK_S = 0.25
 """For processes that wait for a processor on a busy machine; the axis' own clock knows none."""
-STAGE = {
-    "stage": {
-        "mass": 2.0,
-        "force_constant": 4.0,
-        "voltage_limit": 10.0,
-        "viscous": 8.0,
-        "friction": [{"stiffness": 3.2e5, "reach": 1.5e-6}, {"stiffness": 2.2e4, "reach": 3.5e-5}],
-    },
-    "sensor": {"resolution": 1e-8},
-    "rate": 1000.0,
-}
-HOST = """
-import sys, time
-from rtcomp_drivers.driver import Bench
-from rtcomp_drivers.registry import create
-place = {"interface": "slcan", "channel": sys.argv[1], "node": 5, "clear_fault": True}
-device = create({"driver": "cia402", "watchdog": float(sys.argv[2]), "reply_timeout": 0.05,
-                 "max_missed": 100000, **place}, Bench(period=1e-3))
-device.open()
-try:
-    for k in range(1000000):
-        device.exchange(1.0)
-        if k == 20:
-            print("running", flush=True)
-        time.sleep(1e-3)
-finally:
-    device.close()
-"""
-
-
-@pytest.fixture(scope="module")
-def stage_path(tmp_path_factory):
-    path = tmp_path_factory.mktemp("cia402") / "stage.yaml"
-    path.write_text(yaml.safe_dump(STAGE))
-    return path
 
 
 @pytest.fixture
-def plant(stage_path):
-    with PlantProcess(stage_path, link="cia402") as process:
+def plant(stage_file):
+    with PlantProcess(stage_file, link="cia402") as process:
         yield process
 
 
-def connect(plant, **settings):
+def connect(plant, stage, **settings):
     place = {"interface": "slcan", "channel": plant.port, "node": 5}
     settings = {"driver": "cia402", "reply_timeout": 0.1, "watchdog": 2.0, **place, **settings}
-    return create(settings, Bench(stage=Stage.from_dict(STAGE), period=1e-3))
+    return create(settings, Bench(stage=stage, period=1e-3))
 
 
 def host(plant):
     """A loop in another process, pushing the stage with 1 V at about 1 kHz."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", HOST, plant.port, str(WATCHDOG_S)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
-    assert process.stdout.readline() == b"running\n", process.stderr.read()
-    return process
+    place = {"interface": "slcan", "channel": plant.port, "node": 5, "clear_fault": True}
+    settings = {"driver": "cia402", "watchdog": WATCHDOG_S, "reply_timeout": 0.05, **place}
+    return pushing(max_missed=100_000, **settings)
 
 
-def test_it_moves_and_stands_where_it_was_left(plant):
-    with connect(plant) as device:
+def test_it_moves_and_stands_where_it_was_left(plant, stage):
+    with connect(plant, stage) as device:
         began = device.exchange(0.0).position
         for _ in range(100):
             sample = device.exchange(3.0)
             time.sleep(1e-3)
         assert sample.status == OK
         assert sample.position > began + 1e-5
-    with connect(plant) as device:
+    with connect(plant, stage) as device:
         assert device.exchange(0.0).position > began + 1e-5
     summary = plant.stop()
     assert [z["cause"] for z in summary["zeroings"]] == ["disabled", "disabled"]
     assert summary["watchdog_trips"] == summary["bad_frames"] == summary["emergencies"] == 0
 
 
-def test_no_thread_stands_beside_the_loop(plant):
+def test_no_thread_stands_beside_the_loop(plant, stage):
     before = threading.active_count()
-    with connect(plant) as device:
+    with connect(plant, stage) as device:
         device.exchange(0.0)
         assert threading.active_count() == before
 
@@ -114,20 +72,18 @@ def test_no_thread_stands_beside_the_loop(plant):
         pytest.param(signal.SIGSTOP, 100, marks=pytest.mark.slow),
     ],
 )
-def test_a_host_that_dies_or_stands_still_leaves_a_zero_output(plant, how, times):
+def test_a_host_that_dies_or_stands_still_leaves_a_zero_output(plant, stage, how, times):
     rng = random.Random(402)
     silent = []
     for _ in range(times):
-        process = host(plant)
-        time.sleep(rng.uniform(0.0, 0.3))
-        process.send_signal(how)
-        silent.append(time.monotonic())
-        time.sleep(WATCHDOG_S + SLACK_S)
-        process.kill()
-        process.communicate()
+        with host(plant) as process:
+            time.sleep(rng.uniform(0.0, 0.3))
+            process.send_signal(how)
+            silent.append(time.monotonic())
+            time.sleep(WATCHDOG_S + SLACK_S)
     with pytest.raises(DeviceError, match=r"fault: heartbeat of the host lost \(8130h\)"):
-        connect(plant).open()
-    with connect(plant, clear_fault=True) as device:
+        connect(plant, stage).open()
+    with connect(plant, stage, clear_fault=True) as device:
         assert device.state is State.DISABLED
         assert device.exchange(0.0).status == OK  # armed: and yet no torque
         assert device._drive.read(0x6077) == 0
@@ -142,15 +98,15 @@ def test_a_host_that_dies_or_stands_still_leaves_a_zero_output(plant, how, times
 
 
 def test_an_interrupted_host_disables_by_itself(plant):
-    process = host(plant)
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=10.0)
+    with host(plant) as process:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=10.0)
     (zeroing,) = plant.stop()["zeroings"]
     assert zeroing["cause"] == "disabled"
 
 
-def test_unplugged_while_running(plant):
-    device = connect(plant)
+def test_unplugged_while_running(plant, stage):
+    device = connect(plant, stage)
     with device:
         device.exchange(0.5)
         plant.kill()
@@ -162,6 +118,6 @@ def test_unplugged_while_running(plant):
     assert any("watchdog must see to it" in remark for remark in device.remarks)
 
 
-def test_a_bit_rate_that_is_not_the_buss(plant):
+def test_a_bit_rate_that_is_not_the_buss(plant, stage):
     with pytest.raises(DeviceTimeoutError, match="does not answer at 500000 bit/s"):
-        connect(plant, bitrate=500_000).open()
+        connect(plant, stage, bitrate=500_000).open()

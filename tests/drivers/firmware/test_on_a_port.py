@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
+from pushing_host import pushing
 from rtcomp_drivers.driver import Bench
 from rtcomp_drivers.plant_process import PlantProcess
 from rtcomp_drivers.registry import create
@@ -18,18 +16,6 @@ from rtcomp.errors import DeviceError
 from rtcomp.loop.device import OK
 
 WATCHDOG_S = 0.1
-HOST = """
-import sys, time
-from rtcomp_drivers.driver import Bench
-from rtcomp_drivers.registry import create
-settings = {"driver": "serial", "port": sys.argv[1], "watchdog": 0.1, "reply_timeout": 0.2}
-device = create(settings, Bench(period=1e-3))
-device.open()
-print("driving", flush=True)
-while True:
-    device.exchange(0.5)
-    time.sleep(1e-3)
-"""
 
 
 def test_the_driver_moves_the_stage_through_it(stage_file: Path, built: Path) -> None:
@@ -54,15 +40,11 @@ def test_the_driver_moves_the_stage_through_it(stage_file: Path, built: Path) ->
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
 def test_without_a_host_it_zeroes_within_its_watchdog(stage_file: Path, built: Path, number: int) -> None:
     with PlantProcess(stage_file, firmware=built / "rtcomp-board") as plant:
-        host = subprocess.Popen([sys.executable, "-c", HOST, plant.port], stdout=subprocess.PIPE)
-        try:
-            assert host.stdout is not None and host.stdout.readline() == b"driving\n"
+        settings = {"driver": "serial", "port": plant.port, "watchdog": WATCHDOG_S}
+        with pushing(volts=0.5, reply_timeout=0.2, **settings) as host:
             time.sleep(0.3)
-            os.kill(host.pid, number)
+            host.send_signal(number)
             time.sleep(3 * WATCHDOG_S)
-        finally:
-            host.kill()
-            host.communicate()
         summary = plant.stop()
     assert summary["watchdog_trips"] == 1 and summary["state"] == 2
     (zeroed,) = summary["zeroings"]
