@@ -234,11 +234,19 @@ def _look_ahead(
             continue
         if not _settles_the_rest(base.errors, rival.errors, both.errors, floor):
             continue
-        most = max(SHAPED * left, enough) if last(chosen) in SHAPELESS else TOGETHER * left
-        if float(both.errors.sum()) < most:
+        if float(both.errors.sum()) < _most_left(last(chosen), last(both), left, enough):
             chosen, ahead, left = rival, other, float(both.errors.sum())
     others = [best, *(r for r in first.others if r is not chosen)] if chosen is not best else first.others
     return replace(first, best=chosen, others=others), ahead
+
+
+def _most_left(chosen: str, second: str, left: float, enough: float) -> float:
+    """Return the error that another first entry must reach, with `second` beside it, to replace `chosen`.
+
+    A free curve gives way to a name that does nearly as well, but not to one that needs the curve beside it.
+    """
+    spares = chosen in SHAPELESS and second not in SHAPELESS
+    return max(SHAPED * left, enough) if spares else TOGETHER * left
 
 
 def _exchange(

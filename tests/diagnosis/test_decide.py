@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtcomp.diagnosis.decide import _settles_the_rest, _worth_it
+from rtcomp.diagnosis.decide import _most_left, _settles_the_rest, _worth_it
 from rtcomp.diagnosis.explain import LEAST, MUCH, _explains_little, _leaves_much
 from rtcomp.diagnosis.result import Fit
 from rtcomp.kernels import Floats
@@ -64,3 +64,17 @@ def test_a_small_gain_counts_where_nearly_every_block_has_it() -> None:
     # The same gain, had in a third of the blocks only, may be an accident of the floor.
     few = np.where(np.arange(BLOCKS) % 3 == 0, 0.55 * 3 / BLOCKS, 0.0)
     assert not _worth_it(before, before - few, floor)
+
+
+@pytest.mark.parametrize(
+    ("chosen", "second", "most"),
+    [
+        ("position-force", "stribeck", 9.5),
+        ("position-force", "position-force", 6.0),
+        ("cogging", "stribeck", 6.0),
+    ],
+)
+def test_a_free_curve_gives_way_to_a_name_unless_it_stays_beside_it(
+    chosen: str, second: str, most: float
+) -> None:
+    assert _most_left(chosen, second, 10.0, 1.0) == pytest.approx(most)
