@@ -69,16 +69,20 @@ class Seen:
     """V, largest output told meanwhile."""
     went_on: int = 0
     """Stopped loops that were let go on, and ended by an error without a word more to the motor."""
+    over: int = 0
+    """Loops that a stall of the machine had ended before the moment; another moment was drawn for each."""
 
 
-def one(config: Configuration, number: int, moment: float, seen: Seen) -> tuple[float, float]:
+def one(config: Configuration, number: int, moment: float, seen: Seen) -> tuple[float, float] | None:
     """Signal a running loop at `moment` (s), look at the device afterwards; return when it began and when
-    the signal was sent (s, monotonic)."""
+    the signal was sent (s, monotonic), None where the loop had ended by then."""
     began = time.monotonic()
     with ForkedLoop(config, config.reference(), LONGEST_RUN_S, running=1) as loop:
         if not loop.wait_for("running", PATIENCE_S):
             raise RuntimeError(f"the loop did not begin within {PATIENCE_S:g} s: {loop.told}")
-        time.sleep(moment)
+        if loop.wait_for("ended", moment):
+            look_again(config, Seen())
+            return None
         sent = loop.signal(number)
         seen.moments += 1
         time.sleep(WATCHDOG_S + SETTLE_S)
@@ -143,7 +147,11 @@ def link(config: Configuration, program: Path | None, number: int, moments: int,
         )
         if program is not None:
             on_time(plant.pid)
-        times = [one(config, number, draw.uniform(0.0, LONGEST_S), seen) for _ in range(moments)]
+        times: list[tuple[float, float]] = []
+        while len(times) < moments:
+            struck = one(config, number, draw.uniform(0.0, LONGEST_S), seen)
+            seen.over += struck is None
+            times += [] if struck is None else [struck]
         account = plant.stop()
     began = account["started_monotonic_s"]
     zeroings = [
@@ -182,7 +190,7 @@ def figures_of(seen: Seen, who: str) -> list[Figure]:
     return [
         Figure(
             f"{who}: zeroed by the watchdog", float(len(seen.since_command)), of, every,
-            f"{seen.already} before the signal: the machine had stalled" if seen.already else "",
+            f"{seen.already} before the signal, {seen.over} more loops had ended: the machine had stalled",
         ),
         Figure(f"{who}: zero after the last command, worst", worst, "ms", f"<= {ms + 1:g}"),
         Figure(f"{who}: zero after the signal, worst", sent, "ms", "", "as processes were run"),

@@ -10,7 +10,9 @@ from pathlib import Path
 
 import numpy as np
 from on_terminal import on_terminal
+from warm_command import Warm
 
+_WARM = Warm()
 RTCOMP = str(Path(sys.executable).parent / "rtcomp")
 
 CONFIG = """\
@@ -62,10 +64,7 @@ seed: 3
 
 def rtcomp(*arguments: object, at: Path, timeout: float = 120.0) -> subprocess.CompletedProcess[str]:
     """Run `rtcomp` in the folder `at`."""
-    return subprocess.run(
-        [RTCOMP, *map(str, arguments)], cwd=at, capture_output=True, text=True, timeout=timeout,
-        stdin=subprocess.DEVNULL, env=environment(),
-    )  # fmt: skip
+    return _WARM.run([str(a) for a in arguments], at, environment(), timeout)
 
 
 def environment() -> dict[str, str]:

@@ -23,7 +23,7 @@ from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.recording.reader import load
 
 PROJECT = Path(__file__).resolve().parents[2]
-SLOW = ("--serial", "--port", "rtcomp trial", "rtcomp hil")
+SLOW = ("--serial", "--port", "rtcomp trial", "rtcomp hil", "demo --seed", "bench loop", "bench link")
 PATIENCE = 4
 """Times that an example over a port is tried on a machine that is busy with something else."""
 ONCE = ("demo", "diagnose", "trial", "hil")
