@@ -15,10 +15,11 @@ import numpy as np
 from rtcomp.diagnosis.base import Fitted, bounds_of
 from rtcomp.diagnosis.blocks import Blocks
 from rtcomp.diagnosis.ledger import Ledger
-from rtcomp.diagnosis.motion import Motion, Strip, unstepped
+from rtcomp.diagnosis.motion import Motion, Strip
 from rtcomp.errors import RtcompError
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.simulate import on_reference
+from rtcomp.stage.balance import zero_phase
 from rtcomp.stage.stage import Stage
 from rtcomp.yamlfile import YamlFile
 
@@ -67,8 +68,8 @@ def _shaken(fitted: Fitted, motion: Motion, seed: int) -> np.ndarray:
             -0.5, 0.5, rows
         )
         position = strip.position + fewer * read
-        if motion.coarse:
-            position = unstepped(position, motion.cut, motion.rate)
+        if motion.smoothed:
+            position = zero_phase(position, min(motion.smoothed, 0.4 * motion.rate), motion.rate)
         strips.append(replace(strip, position=position))
     other = Ledger(ledger.stage, replace(motion, strips=strips), ledger.reaches, ledger.known)
     columns = other.system().columns
@@ -94,7 +95,7 @@ def _twin(stage: Stage, motion: Motion, seed: int) -> Motion | None:
         off = float(np.sqrt(np.mean((position - strip.position) ** 2)))
         if run.outcome.ticks < strip.time.size or not off < 0.5 * np.ptp(strip.position):
             return None
-        if motion.coarse:
-            position = unstepped(position, motion.cut, motion.rate)
+        if motion.smoothed:
+            position = zero_phase(position, min(motion.smoothed, 0.4 * motion.rate), motion.rate)
         strips.append(replace(strip, position=position, voltage=run.columns["voltage"]))
     return replace(motion, strips=strips)

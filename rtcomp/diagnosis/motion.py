@@ -55,8 +55,8 @@ class Motion:
     strips: Sequence[Strip]
     rate: float
     cut: float
-    coarse: bool = False
-    """Whether positions were smoothed, lest every count of the encoder be a reversal."""
+    smoothed: float = 0.0
+    """Hz from which on positions were smoothed, lest each count of an encoder be a reversal; 0: were not."""
     averaged: int = 1
     """Rows of the recording to one of the strips."""
     jumps: tuple[tuple[float, float], ...] = ()
@@ -135,23 +135,18 @@ def prepare(stage: Stage, recordings: Sequence[Recording], cut: float | None = N
     else:
         strips = [s for w in wholes for s in _windows(w, factor * WINDOW_ROWS // len(wholes), reach)]
     jumped = tuple(j for s in strips for j in jumps(s.time, s.position))
-    coarse = _coarse(stage, strips)
-    if coarse:
-        strips = [replace(s, position=unstepped(s.position, cut, rate)) for s in strips]
+    smoothed = min(2.0 * cut, 0.4 * rate) if _coarse(stage, strips) else 0.0
+    if smoothed:
+        strips = [replace(s, position=zero_phase(s.position, smoothed, rate)) for s in strips]
     if factor > 1:
         strips = [averaged(s, factor) for s in strips]
         rate /= factor
-    return Motion(strips, rate, cut, coarse, factor, jumped)
+    return Motion(strips, rate, cut, smoothed, factor, jumped)
 
 
 def longest_reach(friction: Effect | None) -> float:
     """Return the travel (m) at which the last of the believed friction yields; 0 where that is not known."""
     return max(r for _, r in friction.elements) if isinstance(friction, MaxwellSlip) else 0.0
-
-
-def unstepped(position: Floats, cut: float, rate: float) -> Floats:
-    """Smooth the counts of a coarse encoder (m, (K,)): every false reversal would be a branch of its own."""
-    return zero_phase(position, min(2.0 * cut, 0.4 * rate), rate)
 
 
 def _stretches(recording: Recording, reach: float) -> list[Strip]:

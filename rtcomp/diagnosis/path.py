@@ -14,6 +14,7 @@ from rtcomp.physics import Effect, Place
 from rtcomp.physics.coupled import contact
 from rtcomp.physics.rows import new_rows
 from rtcomp.physics.wires import SENSED, STEP, TIME
+from rtcomp.stage.lowpass import zero_phase
 
 FINE = 0.3
 """Longest sub-step (rad) of the load's oscillation behind a play."""
@@ -21,7 +22,7 @@ FINE = 0.3
 
 def kinematics(strip: Strip, motion: Motion, effects: Sequence[Effect] = ()) -> tuple[Floats, Floats, Floats]:
     """Return true position, velocity and acceleration (SI) behind a strip, sensor effects undone."""
-    x = true_position(effects, strip.time, strip.position, motion.averaged)
+    x = true_position(effects, strip.time, strip.position, motion.averaged, motion.smoothed)
     return x, *derivatives(x, motion.period)
 
 
@@ -88,10 +89,13 @@ def _drawn(
     return out
 
 
-def true_position(effects: Sequence[Effect], time: Floats, measured: Floats, averaged: int = 1) -> Floats:
+def true_position(
+    effects: Sequence[Effect], time: Floats, measured: Floats, averaged: int = 1, smoothed: float = 0.0
+) -> Floats:
     """Return the position (m) behind a measured one: the sensor effects undone, last first.
 
-    Rows that are means over so many of the recording have a jump of the sensor within them.
+    In rows that are means over so many of the recording, which was smoothed from so many Hz on (0: was not),
+    a jump of the sensor is no step either.
     """
     sensors = sorted((e for e in effects if e.place is Place.SENSOR), key=lambda e: -e.order)
     if not sensors:
@@ -107,13 +111,21 @@ def true_position(effects: Sequence[Effect], time: Floats, measured: Floats, ave
             rows[:, SENSED] = CubicSpline(time, rows[:, SENSED])(np.minimum(time + late, time[-1]))
             continue
         p, state = np.append(effect.vector(), 0.0), np.append(effect.initial_state(), 0.0)
-        if averaged > 1 and effect.name == "sensor-jump":
-            share = ((np.arange(averaged) + 0.5) / averaged - 0.5) * (time[1] - time[0])
-            after = np.mean([time + s >= effect.values["time"] for s in share], axis=0)
-            rows[:, SENSED] -= effect.values["size"] * after
+        if effect.name == "sensor-jump" and (averaged > 1 or smoothed > 0.0):
+            rows[:, SENSED] -= effect.values["size"] * _after(effect.values["time"], time, averaged, smoothed)
             continue
         _undo(effect.inverse.address, p, state, rows)
     return np.ascontiguousarray(rows[:, SENSED])
+
+
+def _after(moment: float, time: Floats, averaged: int, smoothed: float) -> Floats:
+    """Return what became of a step at `moment` (s) from 0 to 1 on its way to the rows at `time` (s, (K,))."""
+    period = float(time[1] - time[0])
+    share = ((np.arange(averaged) + 0.5) / averaged - 0.5) * period
+    after = (time[:, np.newaxis] + share >= moment).astype(np.float64).ravel()
+    if smoothed > 0.0:
+        after = zero_phase(after, smoothed, averaged / period)
+    return np.asarray(after.reshape(-1, averaged).mean(axis=1))
 
 
 @compiled

@@ -7,10 +7,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rtcomp.diagnosis.base import Fitted
 from rtcomp.diagnosis.candidates import effect_of, searches
+from rtcomp.diagnosis.ledger import System
 from rtcomp.diagnosis.scene import Column, Entry, Point, Scene
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
+
+SIZES = {
+    "asymmetric-friction": "asymmetry", "creep": "fraction", "drive-deadband": "width",
+    "drive-delay": "delay", "drive-lag": "time_constant", "frictional-lag": "time_constant",
+    "load-dependent-friction": "coefficient",
+    "non-congruent-friction": "softening", "resonance": "mass_ratio", "sensor-delay": "delay",
+    "stiction-ageing": "growth", "stribeck": "rise",
+}  # fmt: skip
+"""By entry, the parameter that says how large the effect is."""
+NO_GAIN = 0.97
+"""Part of the error left at which an effect as it was tried is of no use; a smaller one may be."""
+SMALLEST, LARGEST = 0.02, 0.8
+"""Range of how much smaller."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +51,7 @@ def screen(
     ledger, seen = fitted.ledger, fitted.ledger.seen
     # An entry that shrinks the drive side shrinks every error; all are stated for the believed drive.
     power = float(fitted.system.blocks.power[seen].sum())
-    best: dict[tuple[str, bool, bool], Screened] = {}
+    best: dict[tuple[str, bool, bool, bool], Screened] = {}
     others = [effect_of(e) for e in effects]
     all_searches = list(searches(scene))
     for number, search in enumerate(all_searches):
@@ -57,6 +72,10 @@ def screen(
                 continue
             scale = power / max(float(system.blocks.power[seen].sum()), 1e-300)
             errors = system.blocks.left_out(seen, fitted.bounds) * scale
+            if errors.sum() > NO_GAIN * fitted.errors.sum() and search.name in SIZES:
+                smaller = _smaller(fitted, system, search)
+                if smaller is not None:
+                    entry, errors = smaller
         if not np.isfinite(errors).all():
             continue
         key = (search.name, *_form(entry))
@@ -72,6 +91,26 @@ def screen(
     return list(first.values())
 
 
-def _form(entry: Entry) -> tuple[bool, bool]:
-    """Say in which of its forms an entry is: whether what sticks follows it, whether its contact is soft."""
-    return bool(entry.get("following")), "contact" in entry
+def _smaller(fitted: Fitted, system: System, tried: Point) -> tuple[Entry, Floats] | None:
+    """Return a smaller effect than the one `tried` in `system`, and the squared errors it should leave.
+
+    What a size does is nearly in proportion to it: the change that the effect made of the residual is a
+    column, whose coefficient is by how much smaller it must be. None where it is not, or is nothing.
+    """
+    before = fitted.system
+    ledger, coefficients = fitted.ledger, fitted.coefficients
+    change = (before.y - before.columns @ coefficients) - (system.y - system.columns @ coefficients)
+    extended = ledger.extended(before, [tried.name], change[:, np.newaxis])
+    bounds = fitted.bounds.with_free(1)
+    part = float(extended.blocks.coefficients(ledger.seen, bounds)[-1])
+    if not SMALLEST < part < LARGEST:
+        return None
+    size = SIZES[tried.name]
+    entry = {**tried.entry, size: part * float(tried.entry[size])}  # type: ignore[arg-type]
+    return entry, extended.blocks.left_out(ledger.seen, bounds)
+
+
+def _form(entry: Entry) -> tuple[bool, bool, bool]:
+    """Say in which of its forms an entry is: whether what sticks follows it, whether its contact is soft,
+    whether its wave has a harmonic."""
+    return bool(entry.get("following")), "contact" in entry, "harmonics" in entry

@@ -105,7 +105,22 @@ def _cogging(s: Scene) -> list[Column]:
         amplitude, phase = _waves(c)
         return {"name": "cogging", "amplitude": amplitude, "period": period, "phase": phase}
 
-    return _periodic(s, "cogging", np.ones_like(s.x), -1.0, entry)
+    def column(period: float) -> Column:
+        k = 2 * np.pi / period
+
+        def columns() -> list[Floats]:
+            return [-np.sin(k * s.x), -np.cos(k * s.x), -np.sin(2 * k * s.x), -np.cos(2 * k * s.x)]
+
+        def compose(c: Floats) -> Entry:
+            amplitude, phase = _waves(c[2:])
+            second = {"order": 2.0, "amplitude": amplitude, "phase": phase}
+            return {**entry(c[:2], period), "harmonics": [second]}
+
+        return Column("cogging", columns, compose)
+
+    one = np.ones_like(s.x)
+    # Magnets and slots seldom pull as a sine does; found piece by piece, a free curve would come before it.
+    return [*_periodic(s, "cogging", one, -1.0, entry), *(column(p) for p in _periods(s, one))]
 
 
 def _ripple(s: Scene) -> list[Column]:

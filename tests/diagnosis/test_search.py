@@ -31,7 +31,28 @@ def test_a_first_look_keeps_every_form() -> None:
     for name in ("stribeck", "frictional-lag", "stiction-ageing", "load-dependent-friction"):
         both = [looked[name].entry, *looked[name].forms]
         assert sorted(bool(entry.get("following")) for entry in both) == [False, True]
-    assert {"contact" in e for e in (looked["backlash"].entry, *looked["backlash"].forms)} == {False, True}
+    for name, key in (("backlash", "contact"), ("cogging", "harmonics")):
+        assert {key in e for e in (looked[name].entry, *looked[name].forms)} == {False, True}
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "more"),
+    [
+        ("stribeck", {"rise": 0.03}, {"velocity": 2e-3}),
+        ("asymmetric-friction", {"asymmetry": 0.01}, {}),
+        ("non-congruent-friction", {"softening": 0.015}, {}),
+        ("load-dependent-friction", {"coefficient": 0.01}, {}),
+    ],
+)
+def test_a_small_effect_is_looked_for_at_its_size(
+    name: str, size: dict[str, float], more: dict[str, float]
+) -> None:
+    """Much smaller than any that is tried: each of those would leave more than there was."""
+    at = scene({"name": name, **size, **more})
+    looked = {s.name: s for s in screen(at, [])}[name]
+    assert looked.gain(at.fitted.errors) > 0.1
+    ((parameter, truth),) = size.items()
+    assert looked.entry[parameter] == pytest.approx(truth, rel=0.5)
 
 
 def test_an_interval_ends_where_its_parameter_does() -> None:
