@@ -8,8 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from loop_rig import WEIGHTS, LateClock, device, go, plan, stage, tick
 
+from rtcomp.control.pid import INTEGRAL
 from rtcomp.errors import DeviceError
 from rtcomp.loop import layout as at
+from rtcomp.loop.kernel import hand_over
 from rtcomp.loop.pace import keep_pace, lose_slot
 from rtcomp.loop.states import Machine, State
 
@@ -94,6 +96,39 @@ def test_a_gap_spoils_the_moment_of_the_gap_and_not_what_follows():
     errors = [of.column("reference") - of.column("position") for of in (left, feedback_alone)]
     with_gaps, alone = (np.sqrt(np.mean(error[400:] ** 2)) for error in errors)
     assert with_gaps < 0.3 * alone, (with_gaps, alone)
+
+
+def handed(c, state, share):
+    """One tick of the share of feedforward; the integral after it."""
+    state[at.SHARE] = share
+    c.pid_s[INTEGRAL] = hand_over(c, state, 1.0)
+    state[at.LAST_SHARE] = share
+    return c.pid_s[INTEGRAL]
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.lists(st.floats(-0.05, 0.05), max_size=40),
+    st.integers(0, 16), st.floats(-1.0, 1.0),
+)  # fmt: skip
+def test_the_integral_gives_back_what_it_took_and_no_more(own, given_up, gained, until, given_again):
+    """Also where feedforward goes off again before it has come back altogether."""
+    one = tick()
+    c, state = one.compensator, one.state
+    c.pid_s[INTEGRAL], state[at.HANDED] = own, given_up
+    assert handed(c, state, 0.0) == pytest.approx(own + given_up)  # no jump of the command
+    for step in gained:
+        c.pid_s[INTEGRAL] += step
+        handed(c, state, 0.0)
+    carried = given_up + sum(gained)
+    for k in range(1, until + 1):
+        assert handed(c, state, k / 16) == pytest.approx(own + carried * (1 - k / 16), abs=1e-12)
+    if 0 < until < 16:
+        state[at.HANDED] = given_again
+        assert handed(c, state, 0.0) == pytest.approx(own + carried * (1 - until / 16) + given_again)
+    for k in range(1 if until < 16 else 17, 17):
+        handed(c, state, k / 16)
+    assert c.pid_s[INTEGRAL] == pytest.approx(own, abs=1e-12)
 
 
 @pytest.mark.parametrize("at_once", [True, False])
