@@ -92,6 +92,9 @@ def diagnose(
     least = np.maximum(floor, NEGLIGIBLE**2 / ABOVE_FLOOR * base.system.blocks.power[base.ledger.seen])
     told = explain(stage, motion, base, floor, least, say, seed)
     decision, named, final, fit = told.decision, told.named, told.final, told.fit
+    if unseen_sticking > MUCH and not named and _open(final, least):
+        # Forces name nothing, and in many rows friction cannot be told from the motion: they are no judge.
+        return told_by_position(stage, recordings, motion, base, unseen_sticking, say, seed)
     extended, entries_found = told.stage, told.entries
     if not named and fit.after > (CLEARLY if _open(final, least) else KEPT) * fit.before:
         extended = stage
