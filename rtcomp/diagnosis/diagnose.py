@@ -104,7 +104,8 @@ def diagnose(
     beside = neighbours(stage, motion, decision.refined if final is not base else refine(base, motion, []))
     effects = _effects(decision, named, base, final, least, motion, beside)
     retuned = retunings(stage, final, beside, extended, birge(final, least))
-    verdict = _verdict(effects, final, floor, least, fit)
+    folded = bool(entries_found) and not named and extended is not stage
+    verdict = _verdict(effects, final, floor, least, fit, folded)
     if verdict == "consistent":
         where = []
     elif verdict == "unexplained" and not effects:
@@ -192,13 +193,16 @@ def _open(final: Fitted, least: Floats) -> bool:
     return float(final.errors.sum()) > max(OPEN * float(least.sum()), AGREES**2 * power)
 
 
-def _verdict(effects: list[Named], final: Fitted, floor: Floats, least: Floats, fit: Fit) -> Verdict:
+def _verdict(
+    effects: list[Named], final: Fitted, floor: Floats, least: Floats, fit: Fit, folded: bool
+) -> Verdict:
+    """Return the verdict; `folded`: what was named only changes believed numbers, and does."""
     if effects:
         return "missing-physics"
     left = float(final.errors.sum())
     if _open(final, least):
         return "unexplained"
-    if fit.before > 1.25 * fit.after and fit.before > AGREES:
+    if folded or (fit.before > 1.25 * fit.after and fit.before > AGREES):
         return "retuned"
     return "consistent" if left < 100 * float(floor.sum()) else "unexplained"
 

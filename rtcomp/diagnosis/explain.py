@@ -31,6 +31,8 @@ again, beyond which names are taken back."""
 LEAST, MUCH, OPEN = 0.35, 0.7, 0.2
 """Part of the held-out squared error above the floor that names with a shape of their own must explain: in
 general, and where they leave more than the part OPEN of the mismatch that was seen."""
+LITTLE = 0.006
+"""Relative force error that is none to speak of."""
 FAR, NEARLY_ALL = 4.0, 0.97
 """A lone name that leaves more than FAR times the floor of what was put aside, and explains less than
 NEARLY_ALL of its squared error above that, is the nearest of the catalogue to something that is not in it."""
@@ -90,7 +92,8 @@ def explain(
         least_part = MUCH if decision.left(floor) > OPEN else LEAST
         strays = shaped and departure(final) > 1.5 * departure(base) + STRAYED
         little = shaped and (_explains_little(fit, least_part) or (len(named) == 1 and _leaves_much(fit)))
-        if not named or (_holds(fit) and not strays and not little):
+        once = any(e["name"] == "sensor-jump" for e in named)
+        if not named or (_holds(fit, once) and not strays and not little):
             return Explanation(decision, named, entries, own, final, fit)
         without |= {first}
     # What the ledger gains must hold in the stage itself; else it is not offered as an explanation.
@@ -98,9 +101,12 @@ def explain(
     return Explanation(decision, [], [], retuned, base, Fit(before, plain, plain, rest))
 
 
-def _holds(fit: Fit) -> bool:
-    """Tell whether names hold on what was put aside: they do no harm there, and help where there is need."""
-    much = 1.5 * fit.floor
+def _holds(fit: Fit, once: bool = False) -> bool:
+    """Tell whether names hold on what was put aside: they do no harm there, and help where there is need.
+
+    What happens `once` happens in no block that is put aside; there it can only harm, and may by a little.
+    """
+    much = max(1.5 * fit.floor, LITTLE if once else 0.0)
     if fit.after > max(HARM * fit.before, much) or fit.after > max(WORSE * fit.retuned, much):
         return False
     return fit.retuned < much or fit.after < HELP * fit.retuned

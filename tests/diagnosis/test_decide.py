@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rtcomp.diagnosis.decide import _most_left, _settles_the_rest, _worth_it
-from rtcomp.diagnosis.explain import LEAST, MUCH, _explains_little, _leaves_much
+from rtcomp.diagnosis.explain import LEAST, MUCH, _explains_little, _holds, _leaves_much
 from rtcomp.diagnosis.result import Fit
 from rtcomp.kernels import Floats
 
@@ -56,6 +56,12 @@ def test_names_that_leave_much_must_explain_most_of_what_was_put_aside() -> None
 )
 def test_a_lone_name_must_not_leave_far_more_than_noise(fit: Fit, much: bool) -> None:
     assert _leaves_much(fit) is much
+
+
+def test_what_happens_once_may_harm_a_little_where_it_does_not_happen() -> None:
+    slightly_worse = Fit(0.0017, 0.0072, 0.0030, 0.0015)
+    assert _holds(slightly_worse, once=True) and not _holds(slightly_worse)
+    assert not _holds(Fit(0.0017, 0.0072, 0.0120, 0.0015), once=True)
 
 
 def test_a_small_gain_counts_where_nearly_every_block_has_it() -> None:
