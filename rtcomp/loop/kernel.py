@@ -119,27 +119,33 @@ def put_aside(i: Identifier, state: Floats) -> None:
     i.ls[:] = i.ls_start
     i.w[:] = i.w_start
     state[at.DIVERGED] += 1.0
+    state[at.CHANGED] = 1.0
     state[at.HELD] = at.HELD_TICKS if state[at.DIVERGED] < at.MOST_DIVERGED else math.inf
 
 
 @compiled
-def hand_over(c: Compensator, state: Floats, wanted: float) -> float:
-    """Return the integral (V) that goes with the share of feedforward: without a jump, and back again.
+def hand_over(c: Compensator, state: Floats, full: float) -> float:
+    """Return the integral (V) that goes with the share of feedforward, of which `full` (V) is all.
 
     As feedforward goes off at once, the integral takes over what it gave. As it fades back, the integral
     gives up what it has gained since, no more: in a short gap feedback has carried little of the friction.
+    A model that was put aside comes back as another, after long: then it gives up what feedforward brings.
     """
     integral, share, last = c.pid_s[INTEGRAL], state[at.SHARE], state[at.LAST_SHARE]
     if share == 0.0 and last > 0.0:
         state[at.OWN] = integral - state[at.CARRIED]
         state[at.CARRIED] = 0.0
         integral += state[at.HANDED]
-    elif share > last and wanted > 0.0:
-        if last == 0.0:
-            state[at.CARRIED] = integral - state[at.OWN]
-        part = state[at.CARRIED] * (share - last) / (1.0 - last)
-        state[at.CARRIED] -= part
-        integral -= part
+    elif share > last and full != 0.0:
+        if state[at.CHANGED] > 0.0:
+            integral -= (share - last) * full
+            state[at.CHANGED] = 1.0 if share < 1.0 else 0.0
+        else:
+            if last == 0.0:
+                state[at.CARRIED] = integral - state[at.OWN]
+            part = state[at.CARRIED] * (share - last) / (1.0 - last)
+            state[at.CARRIED] -= part
+            integral -= part
     most = c.pid_p[INTEGRAL_LIMIT]
     return float(min(max(integral, -most), most))
 
@@ -217,7 +223,7 @@ def tick_kernel(
         row[at.ROW_STATE] = state[at.MODE]
     full = plan[at.FEEDFORWARD] * (plan[at.LEAD_FORCE] + lead) / settings[at.FORCE_CONSTANT]
     if closed and c.pid_p[KI] > 0.0:
-        c.pid_s[INTEGRAL] = hand_over(c, state, plan[at.FEEDFORWARD])
+        c.pid_s[INTEGRAL] = hand_over(c, state, full)
     state[at.LAST_SHARE] = state[at.SHARE]
     feedback = plan[at.VOLTS]
     if closed:

@@ -41,21 +41,21 @@ which a tick is late, slots lost until a fault, 1 where the device sets the pace
 not believed."""
 (
     GOOD, X1, X2, LAST_REFERENCE, LEARNED_AT, EXCESS, FAULT, COMPUTED, UPDATES, STARTED,
-    MODE, SHARE, LAST_SHARE, HANDED, OWN, CARRIED,
+    MODE, SHARE, LAST_SHARE, HANDED, OWN, CARRIED, CHANGED,
     LATE_RUN, LATE_BITS, LATE_SUM, CLEAN, LOST, HELD, DIVERGED, DEGRADED_TIMES,
     AGE, INVALID_RUN, REPEATED_RUN, REPEATED, LAST_SEQUENCE, LAST_TIME,
     MEASURED_AT, MEASURED_SPEED, SINCE, RESTED, RESTED_AT, STUCK_RUN, STUCK_AT, PUSHED, PUSHED_AT,
     PUSHED_MID, HISTORY,
-) = range(41)  # fmt: skip
+) = range(42)  # fmt: skip
 """State: good samples in a row until now; positions one and two ticks ago (m); reference one tick ago (m);
 position at the last update (m); what the limits cut from the last command (V); what the check found;
 execution time of the last tick (us); updates of the weights; whether there was a sample.
 
 Of the states and the pace: `states.State`; share of the feedforward that the state lets through, now and one
 tick ago; the feedforward of the last tick (V); the integral's own part when feedforward went off (V), and
-what it carries in feedforward's place and has not given back (V); late ticks in a row; the last 32 ticks, a
-bit each, and how many were late; ticks in time in a row; slots lost and not forgiven; ticks until a diverged
-identifier may go on; how often it diverged; how often degraded.
+what it carries in feedforward's place and has not given back (V); whether the model has become another since;
+late ticks in a row; the last 32 ticks, a bit each, and how many were late; ticks in time in a row; slots lost
+and not forgiven; ticks until a diverged identifier may go on; how often it diverged; how often degraded.
 
 Of the checks: ticks since a sample was new; without a valid position; with a sample that was not new, in a
 row and in all; the last sequence and device time; the last measured position (m), the speed there (m a tick),
@@ -66,8 +66,9 @@ LATE_IN_ROW, LATE_OF, WINDOW, CLEAN_TICKS = 3, 8, 32, 32
 """Late ticks in a row, and among the last `WINDOW`, that degrade; ticks in time after which it is over."""
 FORGIVE = 1.0 / 100.0
 """Slots lost that each tick in time takes back: one slot in a hundred may be lost for ever."""
-FADE = 1.0 / 16.0
-"""Share of the feedforward that comes back with each tick."""
+FADE, FADE_ANEW = 1.0 / 16.0, 1.0 / 128.0
+"""Share of the feedforward that comes back with each tick: of the model that went off, and of one that was put
+aside and learns anew, whose first updates are large."""
 REPEATED_TICKS = 5
 """Samples in a row that say they are new and are not, after which the device is not believed."""
 REST_TICKS = 100.0

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from rtcomp.kernels import Floats, compiled
 from rtcomp.loop.layout import (
+    CHANGED,
     CLEAN,
     CLEAN_TICKS,
     DEGRADED_TIMES,
     FADE,
+    FADE_ANEW,
     FAULT,
     FORGIVE,
     HELD,
@@ -69,7 +71,7 @@ def keep_pace(state: Floats, late: int) -> None:
     elif state[MODE] == DEGRADED and state[CLEAN] >= CLEAN_TICKS:
         state[MODE] = RUNNING
     if state[MODE] == RUNNING and state[SHARE] < 1.0:
-        state[SHARE] = min(1.0, state[SHARE] + FADE)
+        state[SHARE] = min(1.0, state[SHARE] + (FADE_ANEW if state[CHANGED] > 0.0 else FADE))
 
 
 @compiled
