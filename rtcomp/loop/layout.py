@@ -67,7 +67,7 @@ LATE_IN_ROW, LATE_OF, WINDOW, CLEAN_TICKS = 3, 8, 32, 32
 FORGIVE = 1.0 / 100.0
 """Slots lost that each tick in time takes back: one slot in a hundred may be lost for ever."""
 FADE, FADE_ANEW = 1.0 / 16.0, 1.0 / 128.0
-"""Share of the feedforward that comes back with each tick: of the model that went off, and of one that was put
+"""Share of the feedforward that comes back with each tick: of the model that went off; of one that was put
 aside and learns anew, whose first updates are large."""
 REPEATED_TICKS = 5
 """Samples in a row that say they are new and are not, after which the device is not believed."""
