@@ -190,7 +190,9 @@ def figures_of(seen: Seen, who: str) -> list[Figure]:
     return [
         Figure(
             f"{who}: zeroed by the watchdog", float(len(seen.since_command)), of, every,
-            f"{seen.already} before the signal, {seen.over} more loops had ended: the machine had stalled",
+            f"{seen.already} before the signal, {seen.over} more loops had ended: the machine had stalled"
+            if seen.already or seen.over
+            else "",
         ),
         Figure(f"{who}: zero after the last command, worst", worst, "ms", f"<= {ms + 1:g}"),
         Figure(f"{who}: zero after the signal, worst", sent, "ms", "", "as processes were run"),

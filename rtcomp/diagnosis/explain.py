@@ -31,8 +31,8 @@ again, beyond which names are taken back."""
 LEAST, MUCH, OPEN = 0.35, 0.7, 0.2
 """Part of the held-out squared error above the floor that names with a shape of their own must explain: in
 general, and where they leave more than the part OPEN of the mismatch that was seen."""
-LITTLE = 0.006
-"""Relative force error that is none to speak of."""
+AGREES = 0.006
+"""Relative force error up to which a recording is held to agree, whatever its noise promises."""
 FAR, NEARLY_ALL = 4.0, 0.97
 """A lone name that leaves more than FAR times the floor of what was put aside, and explains less than
 NEARLY_ALL of its squared error above that, is the nearest of the catalogue to something that is not in it."""
@@ -106,7 +106,7 @@ def _holds(fit: Fit, once: bool = False) -> bool:
 
     What happens `once` happens in no block that is put aside; there it can only harm, and may by a little.
     """
-    much = max(1.5 * fit.floor, LITTLE if once else 0.0)
+    much = max(1.5 * fit.floor, AGREES if once else 0.0)
     if fit.after > max(HARM * fit.before, much) or fit.after > max(WORSE * fit.retuned, much):
         return False
     return fit.retuned < much or fit.after < HELP * fit.retuned

@@ -15,11 +15,10 @@ import numpy as np
 from rtcomp.diagnosis.base import Fitted, bounds_of
 from rtcomp.diagnosis.blocks import Blocks
 from rtcomp.diagnosis.ledger import Ledger
-from rtcomp.diagnosis.motion import Motion, Strip
+from rtcomp.diagnosis.motion import Motion, Strip, unstepped
 from rtcomp.errors import RtcompError
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.simulate import on_reference
-from rtcomp.stage.balance import zero_phase
 from rtcomp.stage.stage import Stage
 from rtcomp.yamlfile import YamlFile
 
@@ -69,7 +68,7 @@ def _shaken(fitted: Fitted, motion: Motion, seed: int) -> np.ndarray:
         )
         position = strip.position + fewer * read
         if motion.smoothed:
-            position = zero_phase(position, min(motion.smoothed, 0.4 * motion.rate), motion.rate)
+            position = unstepped(position, motion.smoothed, motion.rate)
         strips.append(replace(strip, position=position))
     other = Ledger(ledger.stage, replace(motion, strips=strips), ledger.reaches, ledger.known)
     columns = other.system().columns
@@ -96,6 +95,6 @@ def _twin(stage: Stage, motion: Motion, seed: int) -> Motion | None:
         if run.outcome.ticks < strip.time.size or not off < 0.5 * np.ptp(strip.position):
             return None
         if motion.smoothed:
-            position = zero_phase(position, min(motion.smoothed, 0.4 * motion.rate), motion.rate)
+            position = unstepped(position, motion.smoothed, motion.rate)
         strips.append(replace(strip, position=position, voltage=run.columns["voltage"]))
     return replace(motion, strips=strips)

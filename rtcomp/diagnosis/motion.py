@@ -137,11 +137,16 @@ def prepare(stage: Stage, recordings: Sequence[Recording], cut: float | None = N
     jumped = tuple(j for s in strips for j in jumps(s.time, s.position))
     smoothed = min(2.0 * cut, 0.4 * rate) if _coarse(stage, strips) else 0.0
     if smoothed:
-        strips = [replace(s, position=zero_phase(s.position, smoothed, rate)) for s in strips]
+        strips = [replace(s, position=unstepped(s.position, smoothed, rate)) for s in strips]
     if factor > 1:
         strips = [averaged(s, factor) for s in strips]
         rate /= factor
     return Motion(strips, rate, cut, smoothed, factor, jumped)
+
+
+def unstepped(position: Floats, smoothed: float, rate: float) -> Floats:
+    """Smooth the counts of a coarse encoder (m, (K,)) from `smoothed` (Hz) on, as far as `rate` lets it."""
+    return zero_phase(position, min(smoothed, 0.4 * rate), rate)
 
 
 def longest_reach(friction: Effect | None) -> float:

@@ -136,16 +136,14 @@ def hand_over(c: Compensator, state: Floats, full: float) -> float:
         state[at.OWN] = integral - state[at.CARRIED]
         state[at.CARRIED] = 0.0
         integral += state[at.HANDED]
+    elif share > last and state[at.CHANGED] > 0.0:
+        integral -= (share - last) * full
     elif share > last and full != 0.0:
-        if state[at.CHANGED] > 0.0:
-            integral -= (share - last) * full
-            state[at.CHANGED] = 1.0 if share < 1.0 else 0.0
-        else:
-            if last == 0.0:
-                state[at.CARRIED] = integral - state[at.OWN]
-            part = state[at.CARRIED] * (share - last) / (1.0 - last)
-            state[at.CARRIED] -= part
-            integral -= part
+        if last == 0.0:
+            state[at.CARRIED] = integral - state[at.OWN]
+        part = state[at.CARRIED] * (share - last) / (1.0 - last)
+        state[at.CARRIED] -= part
+        integral -= part
     most = c.pid_p[INTEGRAL_LIMIT]
     return float(min(max(integral, -most), most))
 
@@ -225,6 +223,8 @@ def tick_kernel(
     if closed and c.pid_p[KI] > 0.0:
         c.pid_s[INTEGRAL] = hand_over(c, state, full)
     state[at.LAST_SHARE] = state[at.SHARE]
+    if state[at.SHARE] == 1.0:
+        state[at.CHANGED] = 0.0
     feedback = plan[at.VOLTS]
     if closed:
         error = plan[at.REFERENCE] - position

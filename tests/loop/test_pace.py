@@ -11,7 +11,7 @@ from loop_rig import WEIGHTS, LateClock, device, go, plan, stage, tick
 from rtcomp.control.pid import INTEGRAL
 from rtcomp.errors import DeviceError
 from rtcomp.loop import layout as at
-from rtcomp.loop.kernel import hand_over
+from rtcomp.loop.kernel import hand_over, put_aside
 from rtcomp.loop.pace import keep_pace, lose_slot
 from rtcomp.loop.states import Machine, State
 
@@ -129,6 +129,38 @@ def test_the_integral_gives_back_what_it_took_and_no_more(own, given_up, gained,
     for k in range(1 if until < 16 else 17, 17):
         handed(c, state, k / 16)
     assert c.pid_s[INTEGRAL] == pytest.approx(own, abs=1e-12)
+
+
+def test_a_model_that_was_put_aside_comes_back_slowly_and_takes_from_the_integral_what_it_brings():
+    """So that the command stays where it is, however rough the model is by now."""
+    one = tick()
+    c, state = one.compensator, one.state
+    state[at.HANDED], state[at.MODE] = 0.4, RUNNING
+    put_aside(one.identifier, state)
+    keep_pace(state, 0)
+    assert state[at.MODE] == DEGRADED and handed(c, state, 0.0) == pytest.approx(0.4)
+    state[at.HELD], state[at.MODE], brings = 0.0, RUNNING, -0.7
+    for k in range(1, 129):
+        keep_pace(state, 0)
+        assert state[at.SHARE] == pytest.approx(k / 128)
+        c.pid_s[INTEGRAL] = hand_over(c, state, brings)
+        state[at.LAST_SHARE] = state[at.SHARE]
+        assert c.pid_s[INTEGRAL] + state[at.SHARE] * brings == pytest.approx(0.4)
+
+
+def test_once_it_has_come_back_a_gap_is_a_gap_again():
+    left = go(
+        device(stage()), tick(weights=RIGHT), plan(TICKS, learn=False, share=1.0), LateClock({300: 1.2e-3})
+    )
+    assert left.tick.state[at.CHANGED] == 0.0
+    begun = tick(weights=RIGHT)
+    begun.state[at.CHANGED] = 1.0
+    left = go(device(stage()), begun, plan(TICKS, learn=False, share=1.0), LateClock({300: 1.2e-3}))
+    back = np.flatnonzero(np.diff((left.column("state") == DEGRADED).astype(int)) == -1)[0] + 1
+    quiet = compensated({})
+    assert left.column("feedforward")[back + 17] == pytest.approx(
+        quiet.column("feedforward")[back + 17], rel=1e-3
+    )
 
 
 @pytest.mark.parametrize("at_once", [True, False])
