@@ -130,7 +130,7 @@ def test_rls_does_not_wind_up(forgetting, excited):
 
     repeat(learner.kernel.address, p, s, x, w, 0.0 if x.any() else 1.0, rounds)
     covariance = s[:16].reshape(4, 4)
-    caps = p[2:]
+    caps = p[2:-1]
     assert (np.diag(covariance) <= caps * (1 + 1e-9)).all() and (np.diag(covariance) > 0).all()
     normal = covariance / np.sqrt(np.outer(caps, caps))
     assert np.allclose(normal, normal.T) and np.linalg.eigvalsh(normal).min() > -1e-12
