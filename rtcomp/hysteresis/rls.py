@@ -9,21 +9,44 @@ import numpy as np
 from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.learner import Learner, register_learner
 from rtcomp.hysteresis.places import INTERVALS, MERGED, PART, SHARE, SPLIT
-from rtcomp.kernels import Floats, learner_kernel, regroup_kernel
+from rtcomp.kernels import Floats, compiled, learner_kernel, regroup_kernel
 
-NOISE_MEMORY = 1000.0
-"""Updates over which the errors are averaged."""
+NOISE_MEMORY, PEAK_MEMORY = 1000.0, 20_000.0
+"""Updates over which the errors are averaged, and in which the largest force is forgotten."""
+LARGE = 0.5
+"""Share of that from which on a force is large."""
 UNSURE = 3.0
 """By which the variances grow where the elements change."""
 SPLIT_TRUST = 0.01
 """Share of the first trust, squared, in which the two parts of a split element may differ."""
 
 
+@compiled
+def noise(s: Floats, x: Floats, w: Floats, error: float, n: int) -> float:
+    """Return the mean square of the errors (N^2) where the friction is large, infinite where it is not.
+
+    Only there its level shows; of small motions, which are foreseen far better, nothing is to be concluded
+    for large ones.
+    """
+    mean = n * n + 2 * n
+    force = 0.0
+    for i in range(n):
+        force += w[i] * x[i]
+    force = abs(force)
+    s[mean + 2] = max(force, s[mean + 2] * (1.0 - 1.0 / PEAK_MEMORY))
+    if force < LARGE * s[mean + 2]:
+        return np.inf
+    s[mean + 1] = min(s[mean + 1] + 1.0, NOISE_MEMORY)
+    s[mean] += (error * error - s[mean]) / s[mean + 1]
+    return s[mean] if s[mean] > 0.0 else np.inf
+
+
 @learner_kernel
 def rls(p: Floats, s: Floats, x: Floats, w: Floats, error: float) -> None:
     """p: N, forgetting, cap of each variance in s (1/m^2, N entries), trust squared, drift squared.
 
-    s: covariance (N x N) over the mean square of the errors (N^2), 2 N scratch, that mean, and of how many.
+    s: covariance (N x N) over the mean square of the errors (N^2), 2 N scratch, that mean, of how many, and
+    the largest force (N).
 
     Forgetting inflates only variances below their cap, so directions that are not excited stop growing
     where they began: no wind-up at rest, in saturation or in part of the range.
@@ -43,10 +66,7 @@ def rls(p: Floats, s: Floats, x: Floats, w: Floats, error: float) -> None:
     growths = scratch + n
     gain = error / spread
     shrink = 1.0 / spread
-    mean = growths + n
-    s[mean + 1] = min(s[mean + 1] + 1.0, NOISE_MEMORY)
-    s[mean] += (error * error - s[mean]) / s[mean + 1]
-    level = p[3 + n] / s[mean] if s[mean] > 0.0 else 0.0
+    level = p[3 + n] / noise(s, x, w, error, n) if p[3 + n] > 0.0 else 0.0
     root = forgetting**-0.5
     for i in range(n):
         along = s[scratch + i]
@@ -141,7 +161,7 @@ class Rls(Learner):
 
     def initial_state(self, scales: Floats) -> Floats:
         """Return the initial covariance, diagonal, and room for scratch."""
-        return np.concatenate([np.diag((self.trust / scales) ** 2).ravel(), np.zeros(2 * scales.size + 2)])
+        return np.concatenate([np.diag((self.trust / scales) ** 2).ravel(), np.zeros(2 * scales.size + 3)])
 
     def information(self, state: Floats, scales: Floats) -> Floats:
         """Return the inverse of the covariance."""

@@ -66,6 +66,7 @@ class Compensated:
             "ticks_late": self.without.outcome.late + self.with_it.outcome.late,
             "slots_lost": self.without.outcome.lost + self.with_it.outcome.lost,
             "degraded": self.without.outcome.degraded + self.with_it.outcome.degraded,
+            "taken_back": self.with_it.outcome.taken_back,
             "stopped_by": self.with_it.outcome.stopped_by,
             "notes": self.notes,
         }

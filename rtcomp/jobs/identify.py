@@ -64,6 +64,7 @@ class Identified:
             "ticks_late": outcome.late,
             "slots_lost": outcome.lost,
             "degraded": outcome.degraded,
+            "taken_back": outcome.taken_back,
             "stopped_by": outcome.stopped_by if self.signal is None else "signal",
             "notes": self.notes,
         }

@@ -41,9 +41,10 @@ class Identifier(NamedTuple):
     sections: Floats
     position_memory: Floats
     force_memory: Floats
-    ls_start: Floats
-    """The learner's state and the weights at the start: what a divergence goes back to."""
-    w_start: Floats
+    ls_kept: Floats
+    """The learner's state and the weights at the start, and later those that proved good: what is gone back
+    to where learning diverges, or foresees less than they do."""
+    w_kept: Floats
     scales: Floats
     """Amplitude of each regressor (m), the offset's too."""
     placing: int
@@ -100,12 +101,45 @@ def identify(
     if learns:
         state[at.LEARNED_AT] = position
         state[at.UPDATES] += 1.0
+        compare(i, state, error, force)
         call_learner(i.learner, i.lp.ctypes.data, i.ls.ctypes.data, i.x.ctypes.data, i.w.ctypes.data, error)
         row[at.ROW_LEARNING] = 1.0
         if not (abs(says(i)) < settings[at.FORCE_BOUND] and sound(i.ls, int(state[at.UPDATES]))):
             put_aside(i, state)
+        elif state[at.TRIED] >= at.COMPARED:
+            guard(i, state)
     if i.placing != 0 and learn > 0.0 and state[at.HELD] == 0.0 and math.isfinite(force):
         move_elements(i, c, force, error if learns else math.nan)
+
+
+@compiled
+def compare(i: Identifier, state: Floats, error: float, force: float) -> None:
+    """Average what the weights, and those kept, did not foresee of a force that neither has learned."""
+    state[at.TRIED] += 1.0
+    count = state[at.TRIED] - at.SETTLING
+    if count > 0.0:
+        kept = force
+        for j in range(i.w.size):
+            kept -= i.w_kept[j] * i.x[j]
+        part = 1.0 / min(count, at.COMPARE_MEMORY)
+        state[at.OWN_OFF] += part * (error * error - state[at.OWN_OFF])
+        state[at.KEPT_OFF] += part * (kept * kept - state[at.KEPT_OFF])
+
+
+@compiled
+def guard(i: Identifier, state: Floats) -> None:
+    """Take the weights back where those kept foresee much more; keep them where they foresee no less."""
+    if state[at.OWN_OFF] > at.WORSE * state[at.KEPT_OFF]:
+        i.ls[:] = i.ls_kept
+        i.w[:] = i.w_kept
+        state[at.TAKEN_BACK] += 1.0
+        state[at.TRIED] = 0.0
+    elif state[at.TRIED] >= at.KEPT_EVERY:
+        if state[at.OWN_OFF] <= state[at.KEPT_OFF]:
+            i.ls_kept[:] = i.ls
+            i.w_kept[:] = i.w
+        state[at.TRIED] = at.SETTLING
+        state[at.OWN_OFF] = state[at.KEPT_OFF] = 0.0
 
 
 @compiled
@@ -113,11 +147,11 @@ def move_elements(i: Identifier, c: Compensator, force: float, error: float) -> 
     """Let the elements of the basis move, and the learner's memory follow them."""
     call_placing(
         i.placing, i.bp.ctypes.data, i.bs.ctypes.data, i.x.ctypes.data, c.bs.ctypes.data, c.x.ctypes.data,
-        i.w.ctypes.data, i.w_start.ctypes.data, i.scales.ctypes.data, i.places.ctypes.data,
+        i.w.ctypes.data, i.w_kept.ctypes.data, i.scales.ctypes.data, i.places.ctypes.data,
         i.change.ctypes.data, force, error,
     )  # fmt: skip
     if i.change[CHANGED] > 0.0:
-        for state in (i.ls, i.ls_start):
+        for state in (i.ls, i.ls_kept):
             call_regroup(i.regroup, i.lp.ctypes.data, state.ctypes.data, i.scales.ctypes.data,
                          i.change.ctypes.data)  # fmt: skip
 
@@ -142,10 +176,11 @@ def sound(ls: Floats, turn: int) -> bool:
 
 @compiled
 def put_aside(i: Identifier, state: Floats) -> None:
-    """Take an identifier that has diverged back to its start, and let it rest; the third time for good."""
-    i.ls[:] = i.ls_start
-    i.w[:] = i.w_start
+    """Take a diverged identifier back to what was kept, and let it rest; the third time for good."""
+    i.ls[:] = i.ls_kept
+    i.w[:] = i.w_kept
     state[at.DIVERGED] += 1.0
+    state[at.TRIED] = 0.0
     state[at.CHANGED] = 1.0
     state[at.HELD] = at.HELD_TICKS if state[at.DIVERGED] < at.MOST_DIVERGED else math.inf
 

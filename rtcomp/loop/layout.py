@@ -45,8 +45,8 @@ not believed."""
     LATE_RUN, LATE_BITS, LATE_SUM, CLEAN, LOST, HELD, DIVERGED, DEGRADED_TIMES,
     AGE, INVALID_RUN, REPEATED_RUN, REPEATED, LAST_SEQUENCE, LAST_TIME,
     MEASURED_AT, MEASURED_SPEED, SINCE, RESTED, RESTED_AT, STUCK_RUN, STUCK_AT, PUSHED, PUSHED_AT,
-    PUSHED_MID, HISTORY,
-) = range(42)  # fmt: skip
+    PUSHED_MID, TRIED, OWN_OFF, KEPT_OFF, TAKEN_BACK, HISTORY,
+) = range(46)  # fmt: skip
 """State: good samples in a row until now; positions one and two ticks ago (m); reference one tick ago (m);
 position at the last update (m); what the limits cut from the last command (V); what the check found;
 execution time of the last tick (us); updates of the weights; whether there was a sample.
@@ -60,7 +60,11 @@ and not forgiven; ticks until a diverged identifier may go on; how often it dive
 Of the checks: ticks since a sample was new; without a valid position; with a sample that was not new, in a
 row and in all; the last sequence and device time; the last measured position (m), the speed there (m a tick),
 and the ticks since; ticks at rest, and where (m); ticks stuck, and where (m); ticks driven one way (signed),
-and where that began and was half over (m). From here on the commands of the last ticks, newest first (V)."""
+and where that began and was half over (m).
+
+Of the guard: updates since the weights kept; mean squares of what the weights and those kept did not foresee
+(N^2); how often the weights were taken back to those. From here on the commands of the last ticks, newest
+first (V)."""
 
 LATE_IN_ROW, LATE_OF, WINDOW, CLEAN_TICKS = 3, 8, 32, 32
 """Late ticks in a row, and among the last `WINDOW`, that degrade; ticks in time after which it is over."""
@@ -75,5 +79,10 @@ REST_TICKS = 100.0
 """Ticks within a count of one place after which the axis rests: there is nothing to learn from."""
 HELD_TICKS = 1000.0
 """Ticks that a diverged identifier is put aside."""
+SETTLING, COMPARED, KEPT_EVERY = 500.0, 2000.0, 4000.0
+"""Updates of a learner that begins which do not count; from which on it is compared with the weights kept;
+after which it gives its own to be kept, if they foresaw no worse."""
+COMPARE_MEMORY, WORSE = 1000.0, 2.0
+"""Updates over which both are averaged; ratio of the mean squares from which on learning has spoiled them."""
 MOST_DIVERGED = 3.0
 """Times after which it stays aside to the end of the run."""

@@ -57,9 +57,11 @@ class Outcome:
     degraded: int = 0
     """Times that feedforward went off for missed deadlines or a diverged identifier."""
     diverged: int = 0
-    """Times that the identifier diverged and was taken back to its start."""
+    """Times that the identifier diverged and was taken back to what it had kept."""
     repeated: int = 0
     """Samples that called themselves new and were not."""
+    taken_back: int = 0
+    """Times that learning had spoiled the weights, and those kept were taken."""
 
 
 class Stop:
@@ -235,7 +237,7 @@ def run(
             device.close()
             if machine.connected:
                 machine.take(Step.CLOSE)
-    counts = (int(state[place]) for place in (at.DEGRADED_TIMES, at.DIVERGED, at.REPEATED))
+    counts = (int(state[place]) for place in (at.DEGRADED_TIMES, at.DIVERGED, at.REPEATED, at.TAKEN_BACK))
     return Outcome(done, late, lost, tick.updates, stopped_by, seconds, *counts)
 
 

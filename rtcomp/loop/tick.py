@@ -175,4 +175,4 @@ class Tick:
     def adopt_weights(self, weights: Floats) -> None:
         """Take weights (size of basis + 1) as the start, to which a diverged identifier goes back."""
         self.weights[:] = weights
-        self.identifier.w_start[:] = weights
+        self.identifier.w_kept[:] = weights
