@@ -1,0 +1,222 @@
+"""What is shown of an inspection: the rows of the table, and the page with the paper's two figures."""
+
+from __future__ import annotations
+
+import math
+import platform
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rtcomp import __version__
+from rtcomp.inspection.branches import Branch
+from rtcomp.inspection.congruency import Congruency
+from rtcomp.inspection.symmetry import Symmetry
+from rtcomp.inspection.words import said_of_closure, said_of_congruency, said_of_rates, said_of_symmetry
+from rtcomp.jobs.inspect import Inspected
+from rtcomp.kernels import Floats
+from rtcomp.report.figures.branches import branches_figure, difference_figure, mirrored_figure
+from rtcomp.report.page import Page, Row, Section
+from rtcomp.report.quantities import si
+
+
+class Units(NamedTuple):
+    """Units of position and force, empty where nobody knows them."""
+
+    position: str
+    force: str
+
+
+def inspected_rows(done: Inspected, units: Units) -> list[Row]:
+    """Return the figures of an inspection, for the page and the terminal."""
+    low, high = done.force_range
+    rising = sum(b.rising for b in done.branches)
+    rows = [
+        Row("Branches", f"{rising} rising, {len(done.branches) - rising} falling", "", _kinds(done)),
+        Row("Force range", high - low, units.force),
+        Row("Smallest reversal", done.sight.reversal, units.position, _grain(done, units)),
+        Row(
+            "Low-pass",
+            done.sight.smoothing_hz or "none",
+            "Hz" if done.sight.smoothing_hz else "",
+            "of position and force",
+        ),
+    ]
+    if done.symmetry is not None:
+        s, unit = done.symmetry, done.symmetry.half_range
+        rows += [
+            Row(
+                "Symmetry: mirrored over branch",
+                _percent(s.compared.between / unit),
+                "%",
+                "rms, of the force half-range",
+            ),
+            Row("... repeat over repeat", _percent(s.compared.within / unit), "%", "scatter"),
+            Row(
+                "... largest, of the means",
+                100 * s.peak / unit,
+                "%",
+                f"after {100 * s.peak_at:.0f} % of the way",
+            ),
+        ]
+    if done.congruency is not None and done.congruency.verdict != "not-testable":
+        k, unit = done.congruency, done.congruency.force_range
+        rows += [
+            Row(
+                "Congruency: rising branches",
+                _percent(k.rising.between / unit),
+                "%",
+                _scatter(k.rising.within / unit),
+            ),
+            Row(
+                "... falling branches",
+                _percent(k.falling.between / unit),
+                "%",
+                _scatter(k.falling.within / unit),
+            ),
+            Row("... rising over mirrored falling", _percent(k.across / unit), "%", "at equal travel"),
+        ]
+        for name, slope in (("force", k.with_force), ("position", k.with_position)):
+            if slope is not None:
+                note = f"{100 * slope.low:.2g} to {100 * slope.high:.2g}; correlation {slope.correlation:.2f}"
+                rows.append(Row(f"Stiffness with {name}", 100 * slope.value, "%", note))
+    if done.closure.gaps.size:
+        gap = 100 * done.closure.rms / done.closure.force_range
+        rows.append(
+            Row(
+                "Closure: gap of minor loops",
+                gap,
+                "%",
+                f"rms of {done.closure.gaps.size}, of the force range",
+            )
+        )
+    if done.rates.change is not None:
+        r = done.rates.change
+        note = f"{100 * r.low / done.rates.half_range:.2g} to {100 * r.high / done.rates.half_range:.2g}"
+        rows.append(Row("Rate: each doubling of speed", 100 * r.value / done.rates.half_range, "%", note))
+    return rows
+
+
+def answers(done: Inspected) -> list[str]:
+    """Return the four answers, a sentence each."""
+    says = {
+        "Symmetry": said_of_symmetry(done.symmetry),
+        "Congruency": said_of_congruency(done.congruency),
+        "Closure": said_of_closure(done.closure),
+        "Rate": said_of_rates(done.rates),
+    }
+    return [f"{name}: {text}." for name, text in says.items()]
+
+
+def inspected_page(done: Inspected, units: Units, stage: str = "") -> Page:
+    """Return the report of `rtcomp inspect`; `stage` names the file where there was one."""
+    verdicts = [v for v in (done.symmetry, done.congruency, done.closure, done.rates) if v is not None]
+    fails = any(v.verdict == "fails" for v in verdicts)
+    settled = all(v.verdict == "holds" for v in verdicts) and len(verdicts) == 4
+    return Page(
+        title="Friction hysteresis, inspected",
+        subtitle=f"recording {done.name}, {'force by ' + stage if stage else 'voltage as force'}",
+        verdict=answers(done),
+        summary=inspected_rows(done, units),
+        notes=done.notes,
+        sections=[_loop(done, units), *_mirrored(done.symmetry, units), *_origin(done.congruency, units)],
+        versions={"rtcomp": __version__, "Python": platform.python_version(), "numpy": np.__version__},
+        tone="poor" if fails else "good" if settled else "plain",
+    )
+
+
+def _loop(done: Inspected, units: Units) -> Section:
+    def paths(some: Sequence[Branch]) -> list[tuple[Floats, Floats]]:
+        rows = [slice(b.rows[0], b.rows[1] + 1) for b in some]
+        return [(done.position[r], done.force[r]) for r in rows]
+
+    figure = branches_figure(
+        paths([b for b in done.branches if b.rising]), paths([b for b in done.branches if not b.rising]),
+        paths(done.left_out), unit=units.position, force_unit=units.force,
+    )  # fmt: skip
+    return Section("The loop and its branches", "A branch is the way from one reversal to the next.", figure)
+
+
+def _mirrored(found: Symmetry | None, units: Units) -> list[Section]:
+    if found is None:
+        return []
+    u = found.travel - 0.5 * found.travel[-1]
+    up, down = found.level + found.rising, found.level + found.falling
+    figure = mirrored_figure(
+        [(u, up), (-u, -down)], [(u, down), (-u, -up)], unit=units.position, force_unit=units.force
+    )
+    unit = found.half_range
+    scatter = 100 * found.compared.within / unit
+    says = (
+        "The largest loop, mean of its repeats, and the same turned by half a turn about its centre. "
+        "Where it is symmetric the lines lie over each other; a constant force moves the centre, no more."
+    )
+    parts = (
+        "Their difference, in % of half of the loop's force range, and what it is made of. In the mean "
+        "curve: a force that goes with the position, whatever the direction. In the opening: a loop that is "
+        "wider on one side."
+    )
+    return [
+        Section("Symmetry: the loop and its mirror image", says, figure),
+        Section(
+            "Where it is not symmetric", parts,
+            difference_figure(u, 100 * found.difference / unit, scatter, unit=units.position),
+        ),
+    ]  # fmt: skip
+
+
+def _origin(found: Congruency | None, units: Units) -> list[Section]:
+    if found is None or not found.branches:
+        return []
+    travel = np.linspace(0.0, max(b.free for b in found.branches), 200)
+    curves = [(b, travel[travel <= b.free * (1 + 1e-9)]) for b in found.branches]
+    curves = [(b, s) for b, s in curves if s.size > 1]
+    total, count = np.zeros(travel.size), np.zeros(travel.size)
+    for b, s in curves:
+        total[: s.size] += b.at(s)
+        count[: s.size] += 1
+    mean = total / np.maximum(count, 1)
+    unit = 100 / found.force_range
+    both = [[(s, b.at(s)) for b, s in curves if b.rising == side] for side in (True, False)]
+    apart = [
+        [(s, unit * (b.at(s) - mean[: s.size])) for b, s in curves if b.rising == side]
+        for side in (True, False)
+    ]
+    says = (
+        "Every branch from its turning point, falling ones mirrored, as far as nothing from before can show. "
+        "Congruent branches of one direction are one line; two lines are a hysteresis that is congruent but "
+        "not symmetric."
+    )
+    emphasis = "The same, less the mean of all branches at equal travel, in % of the force range."
+    return [
+        Section(
+            "Congruency: all branches from a common origin", says,
+            branches_figure(*both, unit=units.position, force_unit=units.force,
+                            x="Travel from the turning point", y="Force gained"),
+        ),
+        Section(
+            "The differences alone", emphasis,
+            branches_figure(*apart, unit=units.position, force_unit="%",
+                            x="Travel from the turning point", y="Force less the mean branch"),
+        ),
+    ]  # fmt: skip
+
+
+def _kinds(done: Inspected) -> str:
+    several = sum(len(kind.repeats) > 1 for kind in done.kinds)
+    left = f"; {len(done.left_out)} left out" if done.left_out else ""
+    return f"{len(done.kinds)} kinds, {several} of them repeated{left}"
+
+
+def _grain(done: Inspected, units: Units) -> str:
+    count = f", count {si(done.sight.grain.count, units.position)}" if done.sight.grain.count else ""
+    return f"noise {si(done.sight.grain.noise, units.position)} rms{count}"
+
+
+def _percent(part: float) -> float | str:
+    return "n/a" if math.isnan(part) else 100 * part
+
+
+def _scatter(part: float) -> str:
+    return "no repeats" if math.isnan(part) else f"scatter of repeats {si(100 * part, '%')}"
