@@ -14,7 +14,7 @@ from rtcomp.kernels import Floats, compiled
 FREE = 0.8
 """Part of a branch, up to the place where memory of the past may show, that is compared: near that place a
 hysteresis without exact memory leaves the branch too early."""
-DWELL = 0.1
+DWELL = 0.2
 """A stop at a reversal longer than this part of the branch is left out of it."""
 
 

@@ -109,4 +109,4 @@ def sight_of(
         if abs(wanted / cut - 1.0) < 0.02:
             break
         cut = wanted
-    return Sight(grain, cut, least, max(2.0 * left, grain.step))
+    return Sight(grain, cut, least, 2.0 * left)

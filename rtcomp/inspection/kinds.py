@@ -10,7 +10,7 @@ import numpy as np
 from rtcomp.inspection.branches import Branch
 
 NEAR = 0.04
-"""Turning points of one kind lie within this part of the stroke,"""
+"""Turning points of one kind lie within this part of the stroke, or what the sensor sees;"""
 LONG = 0.15
 """their lengths within this part of the length,"""
 FORCE = 0.1
@@ -61,10 +61,11 @@ class Kind:
         ]
 
 
-def kinds_of(branches: Sequence[Branch], stroke: float, force_range: float) -> list[Kind]:
-    """Sort whole branches into kinds; `stroke` in m, `force_range` in N.
+def kinds_of(branches: Sequence[Branch], near: float, force_range: float) -> list[Kind]:
+    """Sort whole branches into kinds; turning points `near` (m) each other are one.
 
-    A branch belongs to the first kind whose first branch is as near as NEAR, LONG and FORCE say.
+    A branch belongs to the first kind whose first branch is as long and begins at as much force as LONG and
+    FORCE say.
     """
     found: list[list[Branch]] = []
     founders = np.empty((0, 4))
@@ -74,7 +75,7 @@ def kinds_of(branches: Sequence[Branch], stroke: float, force_range: float) -> l
         mark = np.array([one.sign, one.position, one.length, one.force])
         alike = (
             (founders[:, 0] == mark[0])
-            & (np.abs(founders[:, 1] - mark[1]) <= NEAR * stroke)
+            & (np.abs(founders[:, 1] - mark[1]) <= near)
             & (np.abs(founders[:, 2] - mark[2]) <= LONG * np.maximum(mark[2], founders[:, 2]))
             & (np.abs(founders[:, 3] - mark[3]) <= FORCE * force_range)
         )
@@ -116,7 +117,7 @@ class MajorLoop:
         return float(low), float(high)
 
 
-def major_loop(kinds: Sequence[Kind], stroke: float) -> MajorLoop | None:
+def major_loop(kinds: Sequence[Kind], near: float) -> MajorLoop | None:
     """Return the largest loop that was repeated often enough to know its scatter.
 
     That is: of the loops travelled THRICE each way and longer than HALF of the longest of all, else of those
@@ -128,9 +129,7 @@ def major_loop(kinds: Sequence[Kind], stroke: float) -> MajorLoop | None:
         for up in kinds
         if up.rising
         for down in kinds
-        if not down.rising
-        and abs(up.position - down.end) <= NEAR * stroke
-        and abs(up.end - down.position) <= NEAR * stroke
+        if not down.rising and abs(up.position - down.end) <= near and abs(up.end - down.position) <= near
     ]
     if not loops:
         return None

@@ -11,7 +11,7 @@ import numpy as np
 from rtcomp.inspection.chance import LEAST, Slope, Verdict, slope
 from rtcomp.inspection.kinds import Kind
 
-APART = 1.5
+APART = 2.0
 """Speeds of one kind must differ by this factor."""
 MIDDLE = (0.25, 0.75)
 """Part of the travel over which a branch's level is taken: away from its reversals."""

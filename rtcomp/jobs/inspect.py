@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.inspection.branches import Branch, branches
 from rtcomp.inspection.closure import Closure, closure
 from rtcomp.inspection.congruency import Congruency, congruency
 from rtcomp.inspection.grain import Sight, sight_of
-from rtcomp.inspection.kinds import Kind, MajorLoop, kinds_of, major_loop
+from rtcomp.inspection.kinds import NEAR, Kind, MajorLoop, kinds_of, major_loop
 from rtcomp.inspection.rates import Rates, rates
 from rtcomp.inspection.symmetry import Symmetry, symmetry
 from rtcomp.inspection.words import closure_figures, congruency_figures, rate_figures, symmetry_figures
@@ -28,6 +29,8 @@ from rtcomp.stage.stage import Stage
 LEAST_ROWS = 64
 ENOUGH = 8
 """With so many branches the first loop is left out: it still holds how the run began."""
+LARGE = 0.5
+"""Branches longer than this part of the stroke are looked at with the minor loops in them left out."""
 DOUBTFUL = 0.1
 """A branch of which a larger part was not measured is left out."""
 
@@ -117,7 +120,9 @@ def inspect(
         position, force = (zero_phase(signal, sight.smoothing_hz, rate) for signal in (position, force))
     least = sight.reversal
     found = branches(time, position, force, least, sight.rest)
-    kept, out = _settled(found, settle, good)
+    began = found[2].time if len(found) >= ENOUGH else 0.0
+    settled = began if settle is None else settle
+    kept, out = _parted(found, settled, good)
     _check_branches(recording, position, found, kept, least, settle)
     notes = [*recording.notes, *_said(recording, stage, out, found)]
     span = _range([np.array([b.position, b.end]) for b in kept])
@@ -127,8 +132,12 @@ def inspect(
         raise RecordingError(
             f"{path}: the force is {span_force[0]:g} all along; map another column: --map voltage=COLUMN"
         )
-    kinds = kinds_of(kept, size, size_force)
-    loop = major_loop(kinds, size)
+    near = max(NEAR * size, least)
+    # Over minor loops a branch goes on as if they had not been (wiping-out): the large ones are whole so.
+    large = branches(time, position, force, max(least, LARGE * size), sight.rest)
+    whole = {b.rows[0]: b for b in _parted(large, settled, good)[0]}
+    kinds = kinds_of([whole.get(b.rows[0], b) for b in kept], near, size_force)
+    loop = major_loop(kinds, near)
     centre = (0.5 * sum(span), 0.5 * sum(span_force))
     return Inspected(
         path.name, time, position, force, sight, kept, out, kinds, loop,
@@ -171,20 +180,16 @@ def _force(
     return np.asarray(stage.force_constant * force - stage.mass * acceleration - known)
 
 
-def _settled(
-    found: list[Branch], settle: float | None, good: np.ndarray
+def _parted(
+    found: list[Branch], settled: float, good: npt.NDArray[np.bool_]
 ) -> tuple[list[Branch], list[Branch]]:
     """Return the branches to look at and those left out: the beginning, and what was not measured."""
-    first = 0
-    if settle is not None:
-        first = next((i for i, b in enumerate(found) if b.time >= settle), len(found))
-    elif len(found) >= ENOUGH:
-        first = 2
     kept: list[Branch] = []
-    out = found[:first]
-    for one in found[first:]:
+    out: list[Branch] = []
+    for one in found:
         rows = slice(one.rows[0], one.rows[1] + 1)
-        (kept if np.mean(~good[rows]) <= DOUBTFUL else out).append(one)
+        measured = float(np.mean(good[rows])) >= 1.0 - DOUBTFUL
+        (kept if measured and one.time >= settled else out).append(one)
     return kept, out
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from rtcomp import __version__
 from rtcomp.inspection.branches import Branch
+from rtcomp.inspection.chance import Slope
 from rtcomp.inspection.congruency import Congruency
 from rtcomp.inspection.symmetry import Symmetry
 from rtcomp.inspection.words import said_of_closure, said_of_congruency, said_of_rates, said_of_symmetry
@@ -31,70 +32,48 @@ class Units(NamedTuple):
 def inspected_rows(done: Inspected, units: Units) -> list[Row]:
     """Return the figures of an inspection, for the page and the terminal."""
     low, high = done.force_range
-    rising = sum(b.rising for b in done.branches)
+    cut = done.sight.smoothing_hz
     rows = [
-        Row("Branches", f"{rising} rising, {len(done.branches) - rising} falling", "", _kinds(done)),
+        Row("Branches", len(done.branches), "", _kinds(done)),
         Row("Force range", high - low, units.force),
         Row("Smallest reversal", done.sight.reversal, units.position, _grain(done, units)),
-        Row(
-            "Low-pass",
-            done.sight.smoothing_hz or "none",
-            "Hz" if done.sight.smoothing_hz else "",
-            "of position and force",
-        ),
+        Row("Low-pass", cut or "none", "Hz" if cut else "", "of position and force"),
     ]
     if done.symmetry is not None:
         s, unit = done.symmetry, done.symmetry.half_range
         rows += [
             Row(
-                "Symmetry: mirrored over branch",
+                "Mirrored branch over branch",
                 _percent(s.compared.between / unit),
                 "%",
-                "rms, of the force half-range",
+                "of half the force range",
             ),
-            Row("... repeat over repeat", _percent(s.compared.within / unit), "%", "scatter"),
-            Row(
-                "... largest, of the means",
-                100 * s.peak / unit,
-                "%",
-                f"after {100 * s.peak_at:.0f} % of the way",
-            ),
+            Row("... repeat over repeat", _percent(s.compared.within / unit), "%", "the scatter"),
+            Row("... largest", 100 * s.peak / unit, "%", f"after {100 * s.peak_at:.0f} % of the way"),
         ]
     if done.congruency is not None and done.congruency.verdict != "not-testable":
         k, unit = done.congruency, done.congruency.force_range
         rows += [
             Row(
-                "Congruency: rising branches",
-                _percent(k.rising.between / unit),
-                "%",
-                _scatter(k.rising.within / unit),
+                "Rising over rising", _percent(k.rising.between / unit), "%", _scatter(k.rising.within / unit)
             ),
             Row(
-                "... falling branches",
+                "Falling over falling",
                 _percent(k.falling.between / unit),
                 "%",
                 _scatter(k.falling.within / unit),
             ),
-            Row("... rising over mirrored falling", _percent(k.across / unit), "%", "at equal travel"),
+            Row("Rising over mirrored falling", _percent(k.across / unit), "%", "of the force range"),
         ]
         for name, slope in (("force", k.with_force), ("position", k.with_position)):
             if slope is not None:
-                note = f"{100 * slope.low:.2g} to {100 * slope.high:.2g}; correlation {slope.correlation:.2f}"
-                rows.append(Row(f"Stiffness with {name}", 100 * slope.value, "%", note))
+                rows.append(Row(f"Stiffness with {name}", 100 * slope.value, "%", _within(slope, 1.0)))
     if done.closure.gaps.size:
-        gap = 100 * done.closure.rms / done.closure.force_range
-        rows.append(
-            Row(
-                "Closure: gap of minor loops",
-                gap,
-                "%",
-                f"rms of {done.closure.gaps.size}, of the force range",
-            )
-        )
+        gap, count = 100 * done.closure.rms / done.closure.force_range, done.closure.gaps.size
+        rows.append(Row("Gap of minor loops", gap, "%", f"rms of {count}, of the force range"))
     if done.rates.change is not None:
-        r = done.rates.change
-        note = f"{100 * r.low / done.rates.half_range:.2g} to {100 * r.high / done.rates.half_range:.2g}"
-        rows.append(Row("Rate: each doubling of speed", 100 * r.value / done.rates.half_range, "%", note))
+        r, unit = done.rates.change, done.rates.half_range
+        rows.append(Row("Each doubling of the speed", 100 * r.value / unit, "%", _within(r, unit)))
     return rows
 
 
@@ -204,9 +183,15 @@ def _origin(found: Congruency | None, units: Units) -> list[Section]:
 
 
 def _kinds(done: Inspected) -> str:
-    several = sum(len(kind.repeats) > 1 for kind in done.kinds)
+    rising = sum(b.rising for b in done.branches)
     left = f"; {len(done.left_out)} left out" if done.left_out else ""
-    return f"{len(done.kinds)} kinds, {several} of them repeated{left}"
+    return f"{rising} rising, {len(done.branches) - rising} falling, {len(done.kinds)} kinds{left}"
+
+
+def _within(slope: Slope, unit: float) -> str:
+    return (
+        f"{100 * slope.low / unit:.2g} to {100 * slope.high / unit:.2g}; correlation {slope.correlation:.2f}"
+    )
 
 
 def _grain(done: Inspected, units: Units) -> str:
@@ -219,4 +204,4 @@ def _percent(part: float) -> float | str:
 
 
 def _scatter(part: float) -> str:
-    return "no repeats" if math.isnan(part) else f"scatter of repeats {si(100 * part, '%')}"
+    return "no repeats" if math.isnan(part) else f"repeats {si(100 * part, '%')}"

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import plotly.graph_objects as go
 
 from rtcomp.report import palette
-from rtcomp.report.decimate import Floats, path_indices
+from rtcomp.report.decimate import Floats, peak_indices
 from rtcomp.report.figures import canvas as c
 from rtcomp.report.quantities import scale, typeset
 
@@ -18,7 +18,7 @@ Path = tuple[npt.ArrayLike, npt.ArrayLike]
 
 BRANCHES = 60
 """Branches of each direction that are drawn at most, evenly taken."""
-_EACH = 150
+_EACH = 200
 _LOOKS = {
     "rising": (palette.MEASURED, "solid"),
     "falling": (palette.MODEL, "dash"),
@@ -131,7 +131,7 @@ def _joined(some: Sequence[tuple[Floats, Floats]], fx: float, fy: float) -> tupl
     """Return several paths as one, thinned, with gaps between."""
     xs, ys = [], []
     for along, up in some:
-        kept = path_indices([along, up], _EACH) if along.size > _EACH else np.arange(along.size)
+        kept = peak_indices([along, up], _EACH)
         xs += [along[kept] * fx, np.array([np.nan])]
         ys += [up[kept] * fy, np.array([np.nan])]
     return np.concatenate(xs), np.concatenate(ys)
