@@ -20,7 +20,9 @@ SURE = 0.01
 """p-value from which on a difference is not chance."""
 CLEAR = 4.0
 """Where too few repeats are there for a p-value: a difference this many times their scatter is not chance."""
-_EXACT, _DRAWN = 2000, 1999
+_EXACT, _DRAWN, _BATCH = 2000, 1999, 250
+
+Numbers = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class Compared:
         return "fails" if self.p_value <= SURE else "holds"
 
 
-def distances(curves: Floats, until: npt.NDArray[np.intp]) -> Floats:
+def distances(curves: Floats, until: Numbers) -> Floats:
     """Return the mean square difference of every two `curves` (n, G), over the points both have: (n, n).
 
     Curve i counts up to its `until[i]`-th point.
@@ -70,9 +72,7 @@ def distances(curves: Floats, until: npt.NDArray[np.intp]) -> Floats:
     return out
 
 
-def compare(
-    square: Floats, kinds: npt.NDArray[np.intp], strata: npt.NDArray[np.intp], seed: int = 0
-) -> Compared:
+def compare(square: Floats, kinds: Numbers, strata: Numbers, seed: int = 0) -> Compared:
     """Compare curves of different kinds by their mean square differences `square` (n, n).
 
     `kinds` (n,) numbers the kinds; only curves of one of the `strata` (n,) are compared (branches of one
@@ -81,72 +81,72 @@ def compare(
     are few assignments, drawn otherwise.
     """
     kinds = np.unique(kinds, return_inverse=True)[1].reshape(-1).astype(np.intp)
-    between, within = _means(square, kinds, strata)
+    parts = [np.flatnonzero(strata == s) for s in np.unique(strata)]
+    crossed, inside = _means(square, kinds[None, :], parts)
+    between, within = float(crossed[0]), float(inside[0])
     if math.isnan(between) or math.isnan(within):
         return Compared(math.sqrt(between), math.sqrt(within), math.nan, 1.0)
-    chance = np.random.default_rng(seed)
-    many = sum(_assignments(kinds[strata == s]) for s in np.unique(strata))
-    told = between - within
-    slack = 1e-9 * (between + within)
-    if many <= math.log(_EXACT) and np.unique(strata).size == 1 and np.unique(kinds).size == 2:
-        every = [_told(square, k, strata) for k in _splits(kinds)]
-        p_value = float(np.mean(np.array(every) >= told - slack))
-    else:
-        drawn = np.empty(_DRAWN)
-        for number in range(_DRAWN):
-            mixed = kinds.copy()
-            for s in np.unique(strata):
-                mixed[strata == s] = chance.permutation(kinds[strata == s])
-            drawn[number] = _told(square, mixed, strata)
-        p_value = float((1 + np.count_nonzero(drawn >= told - slack)) / (1 + _DRAWN))
+    many = sum(_assignments(kinds[part]) for part in parts)
+    exact = many <= math.log(_EXACT) and len(parts) == 1 and int(kinds.max()) == 1
+    others = _splits(kinds) if exact else _shuffled(kinds, parts, np.random.default_rng(seed))
+    told = []
+    for first in range(0, len(others), _BATCH):
+        crossed, inside = _means(square, others[first : first + _BATCH], parts)
+        told.append(crossed - inside)
+    as_much = np.count_nonzero(np.concatenate(told) >= between - within - 1e-9 * (between + within))
+    p_value = as_much / len(others) if exact else (1 + as_much) / (1 + len(others))
     # Exchanging the names of two kinds of equal number is the same assignment.
-    alike = sum(_exchanges(kinds[strata == s]) for s in np.unique(strata))
+    alike = sum(_exchanges(kinds[part]) for part in parts)
     smallest = max(math.exp(min(alike - many, 0.0)), 1.0 / (1 + _DRAWN))
-    return Compared(math.sqrt(between), math.sqrt(within), p_value, smallest)
+    return Compared(math.sqrt(between), math.sqrt(within), float(p_value), smallest)
 
 
-def _told(square: Floats, kinds: npt.NDArray[np.intp], strata: npt.NDArray[np.intp]) -> float:
-    between, within = _means(square, kinds, strata)
-    return between - within
+def _means(square: Floats, kinds: Numbers, parts: list[Numbers]) -> tuple[Floats, Floats]:
+    """Return the mean squares between kinds (every two alike) and within kinds (every pair alike), (B,).
 
-
-def _means(square: Floats, kinds: npt.NDArray[np.intp], strata: npt.NDArray[np.intp]) -> tuple[float, float]:
-    """Return the mean squares between kinds (every two alike) and within kinds (every pair alike)."""
-    crossed = []
-    inside, pairs = 0.0, 0
-    for s in np.unique(strata):
-        here = strata == s
-        names, index = np.unique(kinds[here], return_inverse=True)
-        member = np.zeros((index.size, names.size))
-        member[np.arange(index.size), index.reshape(-1)] = 1.0
-        sums = member.T @ square[np.ix_(here, here)] @ member
-        sizes = member.sum(axis=0)
+    kinds: (B, n), an assignment a row, each with as many curves of each kind in each of the `parts`.
+    """
+    between, within = np.zeros(len(kinds)), np.zeros(len(kinds))
+    twos, pairs = 0, 0.0
+    for part in parts:
+        names = np.unique(kinds[0, part])
+        member = (kinds[:, part, None] == names).astype(np.float64)
+        sums = np.swapaxes(member, 1, 2) @ (square[np.ix_(part, part)] @ member)
+        sizes = member[0].sum(axis=0)
         over = np.triu_indices(names.size, 1)
-        crossed.append((sums / np.outer(sizes, sizes))[over])
-        inside += float(np.trace(sums))
-        pairs += int(np.sum(sizes * (sizes - 1)))
-    every = np.concatenate(crossed) if crossed else np.empty(0)
-    return (float(every.mean()) if every.size else math.nan, inside / pairs if pairs else math.nan)
+        between += (sums / np.outer(sizes, sizes))[:, over[0], over[1]].sum(axis=1)
+        twos += over[0].size
+        within += np.trace(sums, axis1=1, axis2=2)
+        pairs += float(np.sum(sizes * (sizes - 1)))
+    none = np.full(len(kinds), math.nan)
+    return (between / twos if twos else none, within / pairs if pairs else none)
 
 
-def _assignments(kinds: npt.NDArray[np.intp]) -> float:
+def _shuffled(kinds: Numbers, parts: list[Numbers], chance: np.random.Generator) -> Numbers:
+    """Return _DRAWN random assignments, (_DRAWN, n), mixed within each part."""
+    out = np.tile(kinds, (_DRAWN, 1))
+    for part in parts:
+        out[:, part] = chance.permuted(out[:, part], axis=1)
+    return out
+
+
+def _assignments(kinds: Numbers) -> float:
     """Return the logarithm of the number of different assignments of curves to kinds."""
     sizes = np.unique(kinds, return_counts=True)[1]
     return math.lgamma(kinds.size + 1) - sum(math.lgamma(n + 1) for n in sizes)
 
 
-def _exchanges(kinds: npt.NDArray[np.intp]) -> float:
+def _exchanges(kinds: Numbers) -> float:
     """Return the logarithm of the number of ways to exchange the names of kinds of equal number."""
     alike = np.unique(np.unique(kinds, return_counts=True)[1], return_counts=True)[1]
     return float(sum(math.lgamma(n + 1) for n in alike))
 
 
-def _splits(kinds: npt.NDArray[np.intp]) -> list[npt.NDArray[np.intp]]:
-    out = []
-    for chosen in combinations(range(kinds.size), int(np.count_nonzero(kinds == kinds[0]))):
-        mixed = np.ones(kinds.size, dtype=np.intp)
-        mixed[list(chosen)] = 0
-        out.append(mixed)
+def _splits(kinds: Numbers) -> Numbers:
+    """Return every assignment of two kinds, a row each."""
+    chosen = np.array(list(combinations(range(kinds.size), int(np.count_nonzero(kinds == 0)))))
+    out = np.ones((len(chosen), kinds.size), dtype=np.intp)
+    np.put_along_axis(out, chosen, 0, axis=1)
     return out
 
 
@@ -176,7 +176,7 @@ class Slope:
         }
 
 
-def slope(x: Floats, y: Floats, blocks: npt.NDArray[np.intp]) -> Slope | None:
+def slope(x: Floats, y: Floats, blocks: Numbers) -> Slope | None:
     """Return the slope of y over x, both (n,), with a level of its own for each of the `blocks` (n,).
 
     Ordinary least squares; None where points or the range of x do not suffice for a confidence.

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from rtcomp.inspection.branches import FREE, Branch, on_grid
 from rtcomp.inspection.chance import Compared, Slope, Verdict, compare, distances, slope
 from rtcomp.inspection.kinds import Kind
+from rtcomp.kernels import Floats
 
 POINTS = 160
 MOST = 160
@@ -93,8 +94,9 @@ def _stiffness(
 ) -> tuple[float, Slope | None, Slope | None]:
     """Return the travel over which stiffness is taken, and how it goes with position and force there.
 
-    The stiffness of a kind is the force it gains over that travel. Place and force are those in the middle of
-    that travel, so that they mean the same in both directions; each direction has a level of its own.
+    The stiffness of a kind is the force it gains over that travel. The place is the middle of that travel,
+    the force the mean of its size along it, so that they mean the same in both directions; each direction has
+    a level of its own.
     """
     free = np.array([FREE * min(b.free for b in kind.repeats) for kind in kinds])
     if free.size == 0:
@@ -105,13 +107,17 @@ def _stiffness(
     gained = np.array([np.mean([float(b.at(at)[0]) for b in kind.repeats]) for kind in used])
     sign = np.array([1.0 if kind.rising else -1.0 for kind in used])
     usual = float(np.mean(np.abs(gained)))
-    if usual <= 0.0 or len(used) < 4:
+    if usual <= 0.0 or len(used) < 4 or np.any(gained == 0.0):
         return over, None, None
     place = (np.array([kind.position for kind in used]) + 0.5 * sign * over - centre[0]) / (0.5 * stroke)
-    load = np.abs(np.array([kind.force for kind in used]) + 0.5 * sign * gained - centre[1]) / (
-        0.5 * force_range
-    )
+    first = np.array([kind.force for kind in used]) - centre[1]
+    load = _size(first, first + sign * gained) / (0.5 * force_range)
     side = (sign > 0).astype(np.intp)
     by_position = slope(place, gained / usual, side) if np.ptp(place) > _APART else None
     by_force = slope(load, gained / usual, side) if np.ptp(load) > _APART else None
     return over, by_position, by_force
+
+
+def _size(first: Floats, last: Floats) -> Floats:
+    """Return the mean of |F| from F = `first` to F = `last` (N, (n,)): its integral over their difference."""
+    return np.asarray((last * np.abs(last) - first * np.abs(first)) / (2.0 * (last - first)))
