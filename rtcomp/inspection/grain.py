@@ -51,6 +51,8 @@ class Sight:
     smoothing_hz: float
     reversal: float
     rest: float
+    floored: bool = False
+    """Whether the sensor asked for a lower low-pass than the motion allows."""
 
 
 def grain_of(position: Floats) -> Grain:
@@ -87,6 +89,7 @@ def sight_of(
     """
     grain = grain_of(position)
     cut = most_hz if smoothing_hz is None else smoothing_hz
+    floored = False
     for _ in range(_ROUNDS):
         slow = zero_phase(position, cut, rate_hz) if cut > 0.0 else position
         left = grain.left(cut, rate_hz)
@@ -105,8 +108,9 @@ def sight_of(
             )
         if grain.step > 0.0:
             wanted = min(wanted, float(ways.sum()) / seconds / (2.0 * math.pi * grain.step))
+        floored = wanted < PERIODS * frequency
         wanted = min(max(wanted, PERIODS * frequency), most_hz)
         if abs(wanted / cut - 1.0) < 0.02:
             break
         cut = wanted
-    return Sight(grain, cut, least, 2.0 * left)
+    return Sight(grain, cut, least, 2.0 * left, floored)

@@ -123,8 +123,8 @@ def inspect(
     began = found[2].time if len(found) >= ENOUGH else 0.0
     settled = began if settle is None else settle
     kept, out = _parted(found, settled, good)
-    _check_branches(recording, position, found, kept, least, settle)
-    notes = [*recording.notes, *_said(recording, stage, out, found)]
+    _check_branches(recording, position, found, kept, least, reversal, settle)
+    notes = [*recording.notes, *_said(sight, stage, out, found)]
     span = _range([np.array([b.position, b.end]) for b in kept])
     span_force = _range([b.forces() for b in kept])
     size, size_force = span[1] - span[0], span_force[1] - span_force[0]
@@ -199,11 +199,18 @@ def _check_branches(
     found: list[Branch],
     kept: list[Branch],
     least: float,
+    reversal: float | None,
     settle: float | None,
 ) -> None:
     if any(b.rising for b in kept) and any(not b.rising for b in kept):
         return
     path = recording.path
+    stroke = float(np.ptp(position))
+    if least >= 0.5 * stroke:
+        seen = "the least that is no noise of the sensor" if reversal is None else "--reversal"
+        raise RecordingError(
+            f"{path}: {seen} is {least:.3g}, the whole stroke only {stroke:.3g}; there is no loop to look at"
+        )
     if len(found) >= 2 and settle is not None:
         raise RecordingError(
             f"{path}: after --settle {settle:g} s there are {len(kept)} branches; give less: an "
@@ -225,9 +232,7 @@ def _check_branches(
     )
 
 
-def _said(
-    recording: Recording, stage: Stage | None, out: Sequence[Branch], found: Sequence[Branch]
-) -> list[str]:
+def _said(sight: Sight, stage: Stage | None, out: Sequence[Branch], found: Sequence[Branch]) -> list[str]:
     notes = []
     if stage is None:
         notes.append(

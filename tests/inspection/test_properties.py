@@ -150,7 +150,7 @@ def test_an_asymmetry_under_noise_is_found_where_it_is_larger() -> None:
 
 
 def test_one_loop_alone_is_undecided() -> None:
-    x = walk([60.0, -60.0, 60.0, -20.0])
+    x = walk([60.0, -60.0, 60.0, -60.0, 20.0])
     mirror = symmetry(loop_of(x, operator().response(x) + 2e-3 * x**2))
     assert mirror.repeats == (1, 1)
     assert math.isnan(mirror.compared.within) and mirror.verdict == "undecided"
