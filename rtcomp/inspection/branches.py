@@ -38,7 +38,7 @@ class Branch:
     free: float
     """m, travel up to which nothing of what was before its turning point can show."""
     speed: float
-    """m/s, mean."""
+    """m/s, mean over the rows that go further."""
     whole: bool
     """Whether it ends at a reversal, not with the recording."""
     rows: tuple[int, int]
@@ -153,7 +153,8 @@ def _branch(
         return None
     begin = first + start
     gained = sign * (force[begin : last + 1][further] - force[begin])
-    took = float(time[last] - time[begin])
+    # Without the time that small motions, minor loops among them, took.
+    took = float(time[last] - time[begin]) * (travel.size - 1) / (last - begin)
     return Branch(
         rising, float(time[begin]), float(position[begin]), float(force[begin]), travel, gained,
         min(float(travel[-1]), before), float(travel[-1]) / took if took > 0.0 else 0.0, whole, (begin, last),

@@ -174,7 +174,9 @@ def _mild(word: str, verdict: str, compared: Compared, beside: str, unit: float)
         )
         return f"{word} {within}: {beside}"
     if math.isnan(compared.within):
-        return f"undecided: {percent(compared.between / unit)}, and no branch was repeated: what is scatter?"
+        return (
+            f"undecided: {percent(compared.between / unit)}, and no branch was repeated to tell the scatter"
+        )
     return f"undecided: {beside}, too few repeats for a verdict (p below {SURE:g} is out of reach)"
 
 

@@ -43,27 +43,17 @@ def inspected_rows(done: Inspected, units: Units) -> list[Row]:
         s, unit = done.symmetry, done.symmetry.half_range
         rows += [
             Row(
-                "Mirrored branch over branch",
-                _percent(s.compared.between / unit),
-                "%",
-                "of half the force range",
+                "Mirrored branch over branch", 100 * s.compared.between / unit, "%", "of half the force range"
             ),
-            Row("... repeat over repeat", _percent(s.compared.within / unit), "%", "the scatter"),
+            _share("... repeat over repeat", s.compared.within / unit, "the scatter"),
             Row("... largest", 100 * s.peak / unit, "%", f"after {100 * s.peak_at:.0f} % of the way"),
         ]
     if done.congruency is not None and done.congruency.verdict != "not-testable":
         k, unit = done.congruency, done.congruency.force_range
         rows += [
-            Row(
-                "Rising over rising", _percent(k.rising.between / unit), "%", _scatter(k.rising.within / unit)
-            ),
-            Row(
-                "Falling over falling",
-                _percent(k.falling.between / unit),
-                "%",
-                _scatter(k.falling.within / unit),
-            ),
-            Row("Rising over mirrored falling", _percent(k.across / unit), "%", "of the force range"),
+            _share("Rising over rising", k.rising.between / unit, _scatter(k.rising.within / unit)),
+            _share("Falling over falling", k.falling.between / unit, _scatter(k.falling.within / unit)),
+            _share("Rising over mirrored falling", k.across / unit, "of the force range"),
         ]
         for name, slope in (("force", k.with_force), ("position", k.with_position)):
             if slope is not None:
@@ -185,7 +175,8 @@ def _origin(found: Congruency | None, units: Units) -> list[Section]:
 def _kinds(done: Inspected) -> str:
     rising = sum(b.rising for b in done.branches)
     left = f"; {len(done.left_out)} left out" if done.left_out else ""
-    return f"{rising} rising, {len(done.branches) - rising} falling, {len(done.kinds)} kinds{left}"
+    kinds = f"{len(done.kinds)} kind{'' if len(done.kinds) == 1 else 's'}"
+    return f"{rising} rising, {len(done.branches) - rising} falling, {kinds}{left}"
 
 
 def _within(slope: Slope, unit: float) -> str:
@@ -199,8 +190,10 @@ def _grain(done: Inspected, units: Units) -> str:
     return f"noise {si(done.sight.grain.noise, units.position)} rms{count}"
 
 
-def _percent(part: float) -> float | str:
-    return "n/a" if math.isnan(part) else 100 * part
+def _share(name: str, part: float, note: str) -> Row:
+    if math.isnan(part):
+        return Row(name, "n/a", "", "nothing to compare")
+    return Row(name, 100 * part, "%", note)
 
 
 def _scatter(part: float) -> str:

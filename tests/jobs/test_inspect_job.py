@@ -110,7 +110,7 @@ def test_rows_that_were_not_measured_take_their_branches_with_them(leuven: Confi
         ("ramp down", "sine", {}, ["the position only falls"]),
         ("once", "sine", {}, ["turns back once", "two reversals"]),
         ("sine", "none", {}, ["the force is 0 all along", "--map voltage=COLUMN"]),
-        ("sine", "sine", {"reversal": 1.0}, ["--reversal is 1", "the whole stroke only"]),
+        ("sine", "sine", {"reversal": 2.5}, ["--reversal is 2.5", "the whole stroke only"]),
         ("sine", "sine", {"settle": 3.9}, ["after --settle 3.9 s there are 0 branches"]),
     ],
 )  # fmt: skip
