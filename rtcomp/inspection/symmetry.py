@@ -21,7 +21,9 @@ class Symmetry:
     """What the mirrored major loop says. Curves run over `travel` (m, (G,)) from the turning point.
 
     rising, falling: (G,), N, the mean branch about its own mean, the falling one mirrored at the loop's
-    centre (point reflection). Their difference has no mean: a constant force is no asymmetry.
+    centre (point reflection): half way between its turning points, at the force where the difference is
+    smallest, so that its mean is zero. A loop is symmetric where there is such a centre; a constant force
+    only moves it.
     """
 
     travel: Floats
@@ -54,9 +56,9 @@ class Symmetry:
         """Part (squared, 0 to 1) of the difference that lies in the loop's mean curve.
 
         With M half of the sum and H half of the difference of both branches over the distance u from the
-        centre, the difference is 2 (M(u) + M(-u)) / 2 + 2 (H(u) - H(-u)) / 2 less its mean: an even part,
-        from a force that goes with the position, whatever the direction, and an odd one, from a loop that is
-        wider on one side. The parts are orthogonal.
+        centre, the difference is M(u) + M(-u) less its mean, an even part, from a force that goes with the
+        position, whatever the direction, and H(u) - H(-u), an odd one, from a loop that is wider on one side.
+        The parts are orthogonal.
         """
         d = self.difference
         even = 0.5 * (d + d[::-1])

@@ -34,12 +34,8 @@ def said_of_symmetry(found: Symmetry | None) -> str:
     unit = found.half_range
     verdict, beside = found.verdict, _beside(found.compared, unit)
     if verdict == "fails":
-        share = found.mean_curve_share
-        lies = (
-            f"{100 * share:.0f} % of it in the mean curve" if share >= 0.5
-            else f"{100 * (1 - share):.0f} % of it in the opening, wider on one side"
-        )  # fmt: skip
-        return f"asymmetric: {beside}; most after {100 * found.peak_at:.0f} % of the way, {lies}"
+        most = f"most after {100 * found.peak_at:.0f} % of the way"
+        return f"asymmetric: {beside}; {most}, {100 * found.mean_curve_share:.0f} % of it in the mean curve"
     return _mild("symmetric", verdict, found.compared, beside, unit)
 
 

@@ -118,13 +118,14 @@ def _mirrored(found: Symmetry | None, units: Units) -> list[Section]:
     unit = found.half_range
     scatter = 100 * found.compared.within / unit
     says = (
-        "The largest loop, mean of its repeats, and the same turned by half a turn about its centre. "
-        "Where it is symmetric the lines lie over each other; a constant force moves the centre, no more."
+        "The largest loop, mean of its repeats, and the same turned by half a turn about its centre, which "
+        "lies half way between its turning points and where the two are nearest. Where the loop is symmetric "
+        "they lie on one another; a constant force moves the centre, no more."
     )
     parts = (
-        "Their difference, in % of half of the loop's force range, and what it is made of. In the mean "
-        "curve: a force that goes with the position, whatever the direction. In the opening: a loop that is "
-        "wider on one side."
+        "Their difference, in % of half of the loop's force range, and its two parts. A force that goes with "
+        "the position, whatever the direction, lies wholly in the mean curve of the loop; friction that "
+        "differs by direction or along the stroke has a part in its opening too."
     )
     return [
         Section("Symmetry: the loop and its mirror image", says, figure),
