@@ -239,6 +239,11 @@ def _said(sight: Sight, stage: Stage | None, out: Sequence[Branch], found: Seque
             "no stage was given: the column voltage is taken as the force, as it is; inertia and "
             "what goes with speed are in it"
         )
+    if sight.floored:
+        notes.append(
+            f"the sensor is coarse for this motion: the low-pass of {sight.smoothing_hz:.3g} Hz that it asks for "
+            "rounds the corners of the loops, of small ones most"
+        )
     if out:
         notes.append(
             f"{len(out)} of {len(found)} branches left out: the beginning, and what was not measured"
