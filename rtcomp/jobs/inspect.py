@@ -241,8 +241,8 @@ def _said(sight: Sight, stage: Stage | None, out: Sequence[Branch], found: Seque
         )
     if sight.floored:
         notes.append(
-            f"the sensor is coarse for this motion: the low-pass of {sight.smoothing_hz:.3g} Hz that it asks for "
-            "rounds the corners of the loops, of small ones most"
+            f"the sensor is coarse for this motion: the low-pass of {sight.smoothing_hz:.3g} Hz that it asks "
+            "for rounds the corners of the loops, of small ones most"
         )
     if out:
         notes.append(
