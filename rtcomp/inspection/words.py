@@ -11,7 +11,9 @@ from rtcomp.inspection.congruency import Congruency
 from rtcomp.inspection.rates import APART, Rates
 from rtcomp.inspection.symmetry import Symmetry
 
-NO_LOOP = "not testable: no way was travelled in both directions between the same turning points"
+NO_LOOP = (
+    "not testable: no way was travelled in both directions between the same turning points (two loops do)"
+)
 NO_KINDS = "not testable: all branches of one direction begin at one turning point; there are no minor loops"
 NO_MINOR = "not testable: there are no minor loops"
 ONE_SPEED = f"not testable: no branch was repeated at a speed {APART:g} times another"

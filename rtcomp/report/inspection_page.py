@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtcomp import __version__
-from rtcomp.inspection.branches import Branch
+from rtcomp.inspection.branches import FREE, Branch
 from rtcomp.inspection.chance import Slope
 from rtcomp.inspection.congruency import Congruency
 from rtcomp.inspection.symmetry import Symmetry
@@ -140,17 +140,22 @@ def _origin(found: Congruency | None, units: Units) -> list[Section]:
     if found is None or not found.branches:
         return []
     travel = np.linspace(0.0, max(b.free for b in found.branches), 200)
-    curves = [(b, travel[travel <= b.free * (1 + 1e-9)]) for b in found.branches]
-    curves = [(b, s) for b, s in curves if s.size > 1]
+
+    def until(part: float) -> list[tuple[Branch, Floats]]:
+        ways = [(b, travel[travel <= part * b.free * (1 + 1e-9)]) for b in found.branches]
+        return [(b, s) for b, s in ways if s.size > 1]
+
+    both = [[(s, b.at(s)) for b, s in until(1.0) if b.rising == side] for side in (True, False)]
+    # The differences as far as they are compared: beyond, branches end one by one and the mean jumps.
+    compared = until(FREE)
     total, count = np.zeros(travel.size), np.zeros(travel.size)
-    for b, s in curves:
+    for b, s in compared:
         total[: s.size] += b.at(s)
         count[: s.size] += 1
     mean = total / np.maximum(count, 1)
     unit = 100 / found.force_range
-    both = [[(s, b.at(s)) for b, s in curves if b.rising == side] for side in (True, False)]
     apart = [
-        [(s, unit * (b.at(s) - mean[: s.size])) for b, s in curves if b.rising == side]
+        [(s, unit * (b.at(s) - mean[: s.size])) for b, s in compared if b.rising == side]
         for side in (True, False)
     ]
     says = (
@@ -158,7 +163,10 @@ def _origin(found: Congruency | None, units: Units) -> list[Section]:
         "Congruent branches of one direction are one line; two lines are a hysteresis that is congruent but "
         "not symmetric."
     )
-    emphasis = "The same, less the mean of all branches at equal travel, in % of the force range."
+    emphasis = (
+        "The same, as far as it is compared, less the mean of all branches at equal travel, in % of the "
+        "force range."
+    )
     return [
         Section(
             "Congruency: all branches from a common origin", says,
