@@ -107,7 +107,7 @@ def _stiffness(
     gained = np.array([np.mean([float(b.at(at)[0]) for b in kind.repeats]) for kind in used])
     sign = np.array([1.0 if kind.rising else -1.0 for kind in used])
     usual = float(np.mean(np.abs(gained)))
-    if usual <= 0.0 or len(used) < 4 or np.any(gained == 0.0):
+    if usual <= 0.0 or len(used) < 4:
         return over, None, None
     place = (np.array([kind.position for kind in used]) + 0.5 * sign * over - centre[0]) / (0.5 * stroke)
     first = np.array([kind.force for kind in used]) - centre[1]
@@ -120,4 +120,6 @@ def _stiffness(
 
 def _size(first: Floats, last: Floats) -> Floats:
     """Return the mean of |F| from F = `first` to F = `last` (N, (n,)): its integral over their difference."""
-    return np.asarray((last * np.abs(last) - first * np.abs(first)) / (2.0 * (last - first)))
+    both = np.abs(first) + np.abs(last)
+    crossing = (first**2 + last**2) / np.where(both > 0.0, 2.0 * both, 1.0)
+    return np.where(first * last < 0.0, crossing, 0.5 * both)

@@ -122,7 +122,7 @@ def major_loop(kinds: Sequence[Kind], near: float) -> MajorLoop | None:
 
     That is: of the loops travelled THRICE each way and longer than HALF of the longest of all, else of those
     travelled twice, else of all, the longest; of those within ALIKE of it the oftenest repeated. None where
-    no way was travelled in both directions.
+    no way was travelled in both directions with a force that changes.
     """
     loops = [
         MajorLoop(up, down)
@@ -131,6 +131,7 @@ def major_loop(kinds: Sequence[Kind], near: float) -> MajorLoop | None:
         for down in kinds
         if not down.rising and abs(up.position - down.end) <= near and abs(up.end - down.position) <= near
     ]
+    loops = [loop for loop in loops if loop.forces[1] > loop.forces[0]]
     if not loops:
         return None
     longest = max(loop.length for loop in loops)

@@ -207,14 +207,13 @@ def _check_branches(
     path = recording.path
     stroke = float(np.ptp(position))
     if least >= 0.5 * stroke:
-        seen = "the least that is no noise of the sensor" if reversal is None else "--reversal"
+        seen = "--reversal" if reversal is not None else "what is no noise of the sensor (--reversal sets it)"
         raise RecordingError(
             f"{path}: {seen} is {least:.3g}, the whole stroke only {stroke:.3g}; there is no loop to look at"
         )
     if len(found) >= 2 and settle is not None:
         raise RecordingError(
-            f"{path}: after --settle {settle:g} s there are {len(kept)} branches; give less: an "
-            "inspection needs a rising and a falling one"
+            f"{path}: after --settle {settle:g} s there is no rising and falling branch left; give less"
         )
     if len(found) >= 2:
         raise RecordingError(

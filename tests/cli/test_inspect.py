@@ -147,7 +147,7 @@ def test_a_recording_that_cannot_be_used_is_one_line(folder: Path, what: str, sa
         (["--reversal", "0"], ["--reversal", "0"]),
         (["--reversal", "1"], ["--reversal is 1, the whole stroke only 0.0002"]),
         (["--settle", "8"], ["--settle is 8 s; the recording lasts 7.998 s"]),
-        (["--settle", "7.9"], ["after --settle 7.9 s there are 0 branches"]),
+        (["--settle", "7.9"], ["after --settle 7.9 s there is no rising and falling branch"]),
         (["--stage", "none.yaml"], ["none.yaml"]),
         (["--rate", "0"], ["is not a rate"]),
         (["--map", "position=qm"], ["has no column 'qm' for position"]),

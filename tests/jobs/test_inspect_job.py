@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.hysteresis.interval import IntervalBasis
@@ -111,7 +114,7 @@ def test_rows_that_were_not_measured_take_their_branches_with_them(leuven: Confi
         ("once", "sine", {}, ["turns back once", "two reversals"]),
         ("sine", "none", {}, ["the force is 0 all along", "--map voltage=COLUMN"]),
         ("sine", "sine", {"reversal": 2.5}, ["--reversal is 2.5", "the whole stroke only"]),
-        ("sine", "sine", {"settle": 3.9}, ["after --settle 3.9 s there are 0 branches"]),
+        ("sine", "sine", {"settle": 3.9}, ["after --settle 3.9 s there is no rising and falling branch"]),
     ],
 )  # fmt: skip
 def test_what_cannot_be_inspected_is_said(
@@ -161,3 +164,46 @@ def test_measured_piezo_loops(shared_data: Path) -> None:
     found = inspect(read(file, names, rate_hz=10.0))
     assert len(found.branches) == 2
     assert found.summary()["symmetry"]["verdict"] == "not-testable"
+
+
+@given(
+    seed=st.integers(0, 2**31),
+    motion=st.sampled_from(["walk", "sine", "noise", "counts", "steps", "spikes"]),
+    force=st.sampled_from(["position", "noise", "sign", "step", "walk", "cubic"]),
+    scale=st.sampled_from([1e-9, 1e-4, 1.0, 1e5]),
+    smoothing=st.sampled_from([None, 0.0, 1.0, 49.0]),
+)
+@settings(max_examples=80, deadline=None)
+def test_whatever_is_recorded_there_is_an_answer_or_one_clear_error(
+    seed: int, motion: str, force: str, scale: float, smoothing: float | None
+) -> None:
+    chance = np.random.default_rng(seed)
+    rows = int(chance.integers(64, 500))
+    time = np.arange(rows) / 100.0
+    position = {
+        "walk": lambda: np.cumsum(chance.standard_normal(rows)),
+        "sine": lambda: np.sin(time * chance.uniform(0.5, 30.0)),
+        "noise": lambda: chance.standard_normal(rows),
+        "counts": lambda: np.round(3.0 * np.sin(5.0 * time)),
+        "steps": lambda: np.repeat(chance.standard_normal(rows // 8 + 1), 8)[:rows],
+        "spikes": lambda: np.where(chance.random(rows) < 0.02, 50.0, np.sin(4.0 * time)),
+    }[motion]()
+    voltage = {
+        "position": lambda: position,
+        "noise": lambda: chance.standard_normal(rows),
+        "sign": lambda: np.sign(np.gradient(position)),
+        "step": lambda: 1.0 * (time > time.mean()),
+        "walk": lambda: np.cumsum(chance.standard_normal(rows)),
+        "cubic": lambda: position**3,
+    }[force]()
+    columns = {"time": time, "position": scale * position, "voltage": voltage}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            summary = inspect(Recording(columns, 100.0), smoothing_hz=smoothing).summary()
+        except RecordingError as error:
+            assert "\n" not in str(error)
+            return
+    for name in ("symmetry", "congruency", "closure", "rate_dependence"):
+        assert summary[name]["verdict"] in ("holds", "fails", "undecided", "not-testable")
+        assert summary[name]["says"]
