@@ -27,6 +27,8 @@ _POINTER = types.CPointer(types.float64)
 _EFFECT = types.void(_POINTER, _POINTER, _POINTER)
 _BASIS = types.void(_POINTER, _POINTER, _POINTER, types.float64)
 _LEARNER = types.void(_POINTER, _POINTER, _POINTER, _POINTER, types.float64)
+_PLACING = types.void(*[_POINTER] * 10, types.float64, types.float64)
+_REGROUP = types.void(_POINTER, _POINTER, _POINTER, _POINTER)
 
 
 def compiled(function: F) -> F:
@@ -82,6 +84,35 @@ def learner_kernel(function: Callable[..., None]) -> Kernel:
     return Kernel(function, _LEARNER, 4)
 
 
+def placing_kernel(function: Callable[..., None]) -> Kernel:
+    """Make a kernel that moves a basis's elements while it runs (`hysteresis.placing.place`)."""
+    return Kernel(function, _PLACING, 10)
+
+
+def regroup_kernel(function: Callable[..., None]) -> Kernel:
+    """Make a learner's kernel ``f(p, s, scales, change)``: carry its state over a change of the elements."""
+    return Kernel(function, _REGROUP, 4)
+
+
+@intrinsic  # type: ignore[untyped-decorator, unused-ignore]
+def floats_at(typingctx: Any, address: Any) -> Any:
+    """Return the pointer to float64 at an address, for `numba.carray`; the array's owner must outlive it."""
+    return _pointer_to(_POINTER)
+
+
+@intrinsic  # type: ignore[untyped-decorator, unused-ignore]
+def integers_at(typingctx: Any, address: Any) -> Any:
+    """Return the pointer to int64 at an address, as `floats_at`."""
+    return _pointer_to(types.CPointer(types.int64))
+
+
+def _pointer_to(kind: Any) -> Any:
+    def codegen(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+        return builder.inttoptr(values[0], context.get_value_type(kind))
+
+    return kind(types.int64), codegen
+
+
 def _call(pointers: int, numbers: int) -> Any:
     """Build the intrinsic that calls a kernel of `pointers` arrays and `numbers` float64 by address."""
     # The integer arguments are addresses of float64 data (``array.ctypes.data`` inside compiled code).
@@ -114,3 +145,16 @@ def call_basis(typingctx: Any, address: Any, p: Any, s: Any, x: Any, u: Any) -> 
 def call_learner(typingctx: Any, address: Any, p: Any, s: Any, x: Any, w: Any, error: Any) -> Any:
     """Call a learner kernel by address; the arrays are given as ``array.ctypes.data``."""
     return _call(4, 1)
+
+
+@intrinsic  # type: ignore[untyped-decorator, unused-ignore]
+def call_placing(typingctx: Any, address: Any, p: Any, s: Any, x: Any, lead_s: Any, lead_x: Any, w: Any,
+                 begun: Any, scales: Any, m: Any, change: Any, force: Any, error: Any) -> Any:  # fmt: skip
+    """Call a placing kernel by address; the arrays are given as ``array.ctypes.data``."""
+    return _call(10, 2)
+
+
+@intrinsic  # type: ignore[untyped-decorator, unused-ignore]
+def call_regroup(typingctx: Any, address: Any, p: Any, s: Any, scales: Any, change: Any) -> Any:
+    """Call a learner's regroup kernel by address; the arrays are given as ``array.ctypes.data``."""
+    return _call(4, 0)

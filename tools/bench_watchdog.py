@@ -48,6 +48,10 @@ COUNT_M = 1e-12
 """The plant server's count."""
 
 
+class StrandedError(Exception):
+    """The last command, held until the watchdog bit, has carried the axis out of the travel it may have."""
+
+
 @dataclass
 class Seen:
     """What came of one link and one signal."""
@@ -79,6 +83,8 @@ def one(config: Configuration, number: int, moment: float, seen: Seen) -> tuple[
     began = time.monotonic()
     with ForkedLoop(config, config.reference(), LONGEST_RUN_S, running=1) as loop:
         if not loop.wait_for("running", PATIENCE_S):
+            if loop.told.get("error") == "LimitError":
+                raise StrandedError
             raise RuntimeError(f"the loop did not begin within {PATIENCE_S:g} s: {loop.told}")
         if loop.wait_for("ended", moment):
             look_again(config, Seen())
@@ -139,8 +145,17 @@ def samples(host: SerialLink, first: int) -> list[protocol.Measured]:
 
 
 def link(config: Configuration, program: Path | None, number: int, moments: int, draw: random.Random) -> Seen:
-    """Every moment against one plant, whose own account is read at the end."""
+    """Every moment; where a strike has carried the axis away, it is put back: another plant is served."""
     seen = Seen()
+    while seen.moments < moments:
+        one_plant(config, program, number, moments, draw, seen)
+    return seen
+
+
+def one_plant(
+    config: Configuration, program: Path | None, number: int, moments: int, draw: random.Random, seen: Seen
+) -> None:
+    """Strike loops against one plant until the moments are up or the axis is stranded; read its account."""
     with PlantProcess(shipped("leuven.yaml"), firmware=program) as plant:
         config = config.changed(
             device={"driver": "serial", "port": plant.port, "watchdog": WATCHDOG_S, "max_missed": 10_000}
@@ -148,10 +163,11 @@ def link(config: Configuration, program: Path | None, number: int, moments: int,
         if program is not None:
             on_time(plant.pid)
         times: list[tuple[float, float]] = []
-        while len(times) < moments:
-            struck = one(config, number, draw.uniform(0.0, LONGEST_S), seen)
-            seen.over += struck is None
-            times += [] if struck is None else [struck]
+        with contextlib.suppress(StrandedError):
+            while seen.moments < moments:
+                struck = one(config, number, draw.uniform(0.0, LONGEST_S), seen)
+                seen.over += struck is None
+                times += [] if struck is None else [struck]
         account = plant.stop()
     began = account["started_monotonic_s"]
     zeroings = [
@@ -160,7 +176,6 @@ def link(config: Configuration, program: Path | None, number: int, moments: int,
         if z.get("cause", "watchdog") == "watchdog"
     ]
     tell(seen, times, zeroings)
-    return seen
 
 
 def tell(seen: Seen, times: list[tuple[float, float]], zeroings: list[tuple[float, float]]) -> None:

@@ -26,6 +26,8 @@ class Basis:
     be handed in unchanged from call to call (a kernel writes only what the step touched).
     """
     source: ClassVar[str]
+    placing: ClassVar[Kernel | None] = None
+    """What moves the elements while learning runs (`hysteresis.placing`); None where they stay."""
 
     @property
     def size(self) -> int:
@@ -43,6 +45,14 @@ class Basis:
     def scales(self) -> Floats:
         """Return the amplitude of each regressor when fully exercised, shape (size,); m for an input in m."""
         raise NotImplementedError
+
+    def memory(self, gate: float) -> Floats:
+        """Return what `placing` remembers at the start; `gate` (m) is the motion between two updates."""
+        return np.zeros(0)
+
+    def settled(self, vector: Floats) -> Basis:
+        """Return the basis with its elements where the parameters `vector` of a run have them now."""
+        return self
 
     @classmethod
     def over(cls, count: int, total: float, spacing: float = 1.0) -> Basis:

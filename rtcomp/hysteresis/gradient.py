@@ -19,7 +19,7 @@ import numpy as np
 
 from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.learner import Learner, register_learner
-from rtcomp.kernels import Floats, learner_kernel
+from rtcomp.kernels import Floats, learner_kernel, regroup_kernel
 
 
 @learner_kernel
@@ -34,12 +34,20 @@ def projected_gradient(p: Floats, s: Floats, x: Floats, w: Floats, error: float)
         w[i] = max(w[i] + gain * p[3 + i] * x[i], 0.0)
 
 
+@regroup_kernel
+def gradient_regroup(p: Floats, s: Floats, scales: Floats, change: Floats) -> None:
+    """Follow the amplitudes, in Gamma."""
+    for i in range(int(p[0])):
+        p[3 + i] = 1.0 / (scales[i] * scales[i])
+
+
 @register_learner
 class Gradient(Learner):
     """Projected, normalised gradient; `step` (1) is the share of the error taken away at once, below 2."""
 
     name = "gradient"
     kernel = projected_gradient
+    regroup = gradient_regroup
     source = "Kuhnen and Janocha (1999), ECC; Kuhnen (2003), European J. Control 9(4)"
 
     def __init__(self, step: float = 0.05) -> None:

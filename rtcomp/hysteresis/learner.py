@@ -15,7 +15,16 @@ import numpy as np
 
 from rtcomp.errors import ConfigError, nearest
 from rtcomp.hysteresis.basis import Basis
-from rtcomp.kernels import Floats, Kernel, call_basis, call_learner, compiled
+from rtcomp.hysteresis.places import CHANGE_WIDTH, CHANGED
+from rtcomp.kernels import (
+    Floats,
+    Kernel,
+    call_basis,
+    call_learner,
+    call_placing,
+    call_regroup,
+    compiled,
+)
 
 
 class Learner:
@@ -25,6 +34,9 @@ class Learner:
     kernel: ClassVar[Kernel]
     """``f(p, s, x, w, error)``: change the weights `w` from regressors `x` and error (7) = measured - w.x."""
     source: ClassVar[str]
+    regroup: ClassVar[Kernel | None] = None
+    """``f(p, s, scales, change)``: carry parameters and state over a change of the elements (`places`), whose
+    amplitudes are `scales` now; None where the learner cannot, which bars it from elements that move."""
 
     def vector(self, scales: Floats) -> Floats:
         """Return the kernel's parameters for regressors of these amplitudes; `p[0]` is their number."""
@@ -108,6 +120,66 @@ def learn(
         gate,
     )
     return w
+
+
+def learn_places(
+    basis: Basis, learner: Learner, inputs: Floats, outputs: Floats, gate: float = 0.0
+) -> tuple[Basis, Floats]:
+    """Learn as `learn` does with a basis whose elements move; return it as it ends, and the weights (size,).
+
+    Raises ConfigError where the learner cannot follow.
+    """
+    scales, w = basis.scales().copy(), np.zeros(basis.size)
+    vector, params, state = basis.vector(), learner.vector(scales), learner.initial_state(scales)
+    moving, follow = followed(basis, learner)
+    _learn_places(
+        basis.kernel.address, vector, basis.initial_state(), learner.kernel.address, params, state,
+        np.zeros(basis.size), w, np.ascontiguousarray(inputs, dtype=np.float64),
+        np.ascontiguousarray(outputs, dtype=np.float64), gate, moving, follow, scales, basis.memory(gate),
+        np.zeros(CHANGE_WIDTH),
+    )  # fmt: skip
+    return basis.settled(vector), w
+
+
+def followed(basis: Basis, learner: Learner) -> tuple[int, int]:
+    """Return the addresses of what moves the basis's elements and of what the learner does then; 0 for none.
+
+    Raises ConfigError where they move and the learner cannot follow.
+    """
+    if basis.placing is None:
+        return 0, 0
+    if learner.regroup is None:
+        raise ConfigError(
+            f"learner {learner.name} cannot follow the elements of model {basis.name}, which move; take "
+            "another learner, or model interval",
+            key=("learner",),
+        )
+    return basis.placing.address, learner.regroup.address
+
+
+@compiled
+def _learn_places(
+    basis: int, bp: Floats, bs: Floats, learner: int, lp: Floats, ls: Floats, x: Floats, w: Floats,
+    inputs: Floats, outputs: Floats, gate: float, moving: int, follow: int, scales: Floats, memory: Floats,
+    change: Floats,
+) -> None:  # fmt: skip
+    last, begun = inputs[0], w.copy()
+    for k in range(inputs.size):
+        call_basis(basis, bp.ctypes.data, bs.ctypes.data, x.ctypes.data, inputs[k])
+        error = np.nan
+        if abs(inputs[k] - last) >= gate:
+            last = inputs[k]
+            error = outputs[k] - np.dot(w, x)
+            call_learner(learner, lp.ctypes.data, ls.ctypes.data, x.ctypes.data, w.ctypes.data, error)
+        if moving == 0:
+            continue
+        call_placing(
+            moving, bp.ctypes.data, bs.ctypes.data, x.ctypes.data, bs.ctypes.data, x.ctypes.data,
+            w.ctypes.data, begun.ctypes.data, scales.ctypes.data, memory.ctypes.data, change.ctypes.data,
+            outputs[k], error,
+        )  # fmt: skip
+        if change[CHANGED] > 0.0:
+            call_regroup(follow, lp.ctypes.data, ls.ctypes.data, scales.ctypes.data, change.ctypes.data)
 
 
 @compiled

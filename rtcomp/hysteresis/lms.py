@@ -8,12 +8,15 @@ import numpy as np
 
 from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.learner import Learner, register_learner
-from rtcomp.kernels import Floats, learner_kernel
+from rtcomp.kernels import Floats, learner_kernel, regroup_kernel
+
+FLOOR = 1e-4
+"""Of the squared amplitudes, against division by nothing."""
 
 
 @learner_kernel
 def lms(p: Floats, s: Floats, x: Floats, w: Floats, error: float) -> None:
-    """p: N, learning factor mu (1/m^2)."""
+    """p: N, learning factor mu (1/m^2), step (1)."""
     gain = p[1] * error
     for i in range(int(p[0])):
         w[i] += gain * x[i]
@@ -30,6 +33,24 @@ def nlms(p: Floats, s: Floats, x: Floats, w: Floats, error: float) -> None:
         w[i] += gain * x[i]
 
 
+@regroup_kernel
+def lms_regroup(p: Floats, s: Floats, scales: Floats, change: Floats) -> None:
+    """Follow the amplitudes: they alone stand in the learning factor."""
+    total = 0.0
+    for i in range(int(p[0])):
+        total += scales[i] * scales[i]
+    p[1] = p[2] / total
+
+
+@regroup_kernel
+def nlms_regroup(p: Floats, s: Floats, scales: Floats, change: Floats) -> None:
+    """Follow the amplitudes: they alone stand in the floor."""
+    total = 0.0
+    for i in range(int(p[0])):
+        total += scales[i] * scales[i]
+    p[2] = FLOOR * total
+
+
 @register_learner
 class Lms(Learner):
     """The paper's gradient rule, dw = mu * error * x; `step` is mu times the expected squared norm of x.
@@ -39,14 +60,15 @@ class Lms(Learner):
 
     name = "lms"
     kernel = lms
+    regroup = lms_regroup
     source = "the paper's equations (7), (8); Widrow and Hoff (1960)"
 
     def __init__(self, step: float = 0.02) -> None:
         self.step = _checked_step(self.name, step)
 
     def vector(self, scales: Floats) -> Floats:
-        """Return N and mu = step / (sum of squared amplitudes)."""
-        return np.array([scales.size, self.step / float(np.dot(scales, scales))])
+        """Return N, mu = step / (sum of squared amplitudes), and step."""
+        return np.array([scales.size, self.step / float(np.dot(scales, scales)), self.step])
 
     def initial_state(self, scales: Floats) -> Floats:
         """Return nothing: LMS has no memory but the weights."""
@@ -63,6 +85,7 @@ class Nlms(Learner):
 
     name = "nlms"
     kernel = nlms
+    regroup = nlms_regroup
     source = "Nagumo and Noda (1967), IEEE TAC 12(3)"
 
     def __init__(self, step: float = 0.05) -> None:
@@ -70,7 +93,7 @@ class Nlms(Learner):
 
     def vector(self, scales: Floats) -> Floats:
         """Return N, step, and a floor of 1e-4 of the squared amplitudes against division by nothing."""
-        return np.array([scales.size, self.step, 1e-4 * float(np.dot(scales, scales))])
+        return np.array([scales.size, self.step, FLOOR * float(np.dot(scales, scales))])
 
     def initial_state(self, scales: Floats) -> Floats:
         """Return nothing: NLMS has no memory but the weights."""

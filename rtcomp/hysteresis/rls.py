@@ -8,12 +8,22 @@ import numpy as np
 
 from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.learner import Learner, register_learner
-from rtcomp.kernels import Floats, learner_kernel
+from rtcomp.hysteresis.places import INTERVALS, MERGED, PART, SHARE, SPLIT
+from rtcomp.kernels import Floats, learner_kernel, regroup_kernel
+
+NOISE_MEMORY = 1000.0
+"""Updates over which the errors are averaged."""
+UNSURE = 3.0
+"""By which the variances grow where the elements change."""
+SPLIT_TRUST = 0.01
+"""Share of the first trust, squared, in which the two parts of a split element may differ."""
 
 
 @learner_kernel
 def rls(p: Floats, s: Floats, x: Floats, w: Floats, error: float) -> None:
-    """p: N, forgetting, cap of each variance in s (1/m^2, N entries). s: covariance (N x N), then N scratch.
+    """p: N, forgetting, cap of each variance in s (1/m^2, N entries), trust squared, drift squared.
+
+    s: covariance (N x N) over the mean square of the errors (N^2), 2 N scratch, that mean, and of how many.
 
     Forgetting inflates only variances below their cap, so directions that are not excited stop growing
     where they began: no wind-up at rest, in saturation or in part of the range.
@@ -30,55 +40,108 @@ def rls(p: Floats, s: Floats, x: Floats, w: Floats, error: float) -> None:
         spread += total * x[i]
     if not spread > 0.0 or not spread < 1e300:
         return
+    growths = scratch + n
     gain = error / spread
-    for i in range(n):
-        w[i] += gain * s[scratch + i]
-    for i in range(n):
-        row = s[scratch + i] / spread
-        for j in range(i + 1):
-            value = s[i * n + j] - row * s[scratch + j]
-            s[i * n + j] = value
-            s[j * n + i] = value
-    # Inflate: scale row and column i by g_i so that the matrix stays symmetric and positive.
+    shrink = 1.0 / spread
+    mean = growths + n
+    s[mean + 1] = min(s[mean + 1] + 1.0, NOISE_MEMORY)
+    s[mean] += (error * error - s[mean]) / s[mean + 1]
+    level = p[3 + n] / s[mean] if s[mean] > 0.0 else 0.0
     root = forgetting**-0.5
     for i in range(n):
-        own = s[i * n + i]
+        along = s[scratch + i]
+        w[i] += gain * along
+        own = s[i * n + i] - along * along * shrink
         grown = own / forgetting
         cap = p[2 + i]
-        g = root if grown <= cap else (1.0 if own >= cap else (cap / own) ** 0.5)
-        s[scratch + i] = g
+        s[growths + i] = root if grown <= cap else (1.0 if own >= cap else (cap / own) ** 0.5)
+        if max(own, min(grown, cap)) + level * w[i] * w[i] > cap:
+            level = 0.0
+    # Row and column i are scaled by their growth; products commute, so that the matrix stays symmetric.
     for i in range(n):
+        along, growth = s[scratch + i], s[growths + i]
         for j in range(n):
-            s[i * n + j] *= s[scratch + i] * s[scratch + j]
+            value = s[i * n + j] - (along * s[scratch + j]) * shrink
+            s[i * n + j] = value * (growth * s[growths + j]) + level * (w[i] * w[j])
+
+
+@regroup_kernel
+def rls_regroup(p: Floats, s: Floats, scales: Floats, change: Floats) -> None:
+    """Carry the covariance over a merger by the integral and a split, whose two parts are known only as one.
+
+    What was learned with the elements as they lay fits the new ones a little less: `UNSURE`.
+    """
+    n, count = int(p[0]), int(change[INTERVALS])
+    i, k, share, part = int(change[MERGED]), int(change[SPLIT]), change[SHARE], change[PART]
+    trusted = p[2 + n]
+    for j in range(n):
+        s[i * n + j] = share * s[i * n + j] + (1.0 - share) * s[(i + 1) * n + j]
+    for j in range(n):
+        s[j * n + i] = share * s[j * n + i] + (1.0 - share) * s[j * n + i + 1]
+    # Slots between the merged and the split one move up or down by one.
+    for a in range(i + 1, count - 1):
+        for j in range(n):
+            s[a * n + j] = s[(a + 1) * n + j]
+    for a in range(i + 1, count - 1):
+        for j in range(n):
+            s[j * n + a] = s[j * n + a + 1]
+    for a in range(count - 1, k, -1):
+        for j in range(n):
+            s[a * n + j] = s[(a - 1) * n + j]
+    for a in range(count - 1, k, -1):
+        for j in range(n):
+            s[j * n + a] = s[j * n + a - 1]
+    narrow = min(scales[k], scales[k + 1])
+    apart = SPLIT_TRUST * trusted / (narrow * narrow)
+    s[k * n + k] += (1.0 - part) * (1.0 - part) * apart
+    s[(k + 1) * n + k + 1] += part * part * apart
+    s[k * n + k + 1] -= part * (1.0 - part) * apart
+    s[(k + 1) * n + k] -= part * (1.0 - part) * apart
+    for a in range(n):
+        p[2 + a] = trusted / (scales[a] * scales[a])
+        s[n * n + a] = max(1.0, min(UNSURE, p[2 + a] / s[a * n + a])) ** 0.5
+    for a in range(n):
+        for j in range(n):
+            s[a * n + j] *= s[n * n + a] * s[n * n + j]
 
 
 @register_learner
 class Rls(Learner):
     """Least squares on line. `forgetting` (1) per update; `trust` is the ratio of the force expected of
-    one interval to the noise of one sample, by which the first samples move the weights.
+    one interval to the noise of one sample, by which the first samples move the weights. `drift` (1) is
+    how far all of the friction may change, in proportion, from one update to the next (its standard
+    deviation): friction that warms up or wears is followed as a whole, at once.
     """
 
     name = "rls"
     kernel = rls
-    source = "Ljung and Soderstrom (1983); bounded forgetting after Salgado, Goodwin, Middleton (1988)"
+    regroup = rls_regroup
+    source = (
+        "Ljung and Soderstrom (1983); bounded forgetting after Salgado, Goodwin, Middleton (1988); drift as "
+        "process noise along the weights"
+    )
 
-    def __init__(self, forgetting: float = 0.9999, trust: float = 100.0) -> None:
+    def __init__(self, forgetting: float = 0.9999, trust: float = 100.0, drift: float = 0.0) -> None:
         if not 0.9 <= forgetting <= 1.0:
             raise ConfigError(
                 f"learner rls: forgetting is {forgetting:g}; allowed is 0.9 to 1", key=("forgetting",)
             )
         if not 1e-3 <= trust <= 1e9:
             raise ConfigError(f"learner rls: trust is {trust:g}; allowed is 1e-3 to 1e9", key=("trust",))
+        if not 0.0 <= drift <= 0.1:
+            raise ConfigError(f"learner rls: drift is {drift:g}; allowed is 0 to 0.1", key=("drift",))
+        self.drift = float(drift)
         self.forgetting = float(forgetting)
         self.trust = float(trust)
 
     def vector(self, scales: Floats) -> Floats:
-        """Return N, forgetting, and the variances' caps: where they begin."""
-        return np.concatenate([[scales.size, self.forgetting], (self.trust / scales) ** 2])
+        """Return N, forgetting, the variances' caps, where they begin, trust squared and drift squared."""
+        caps = (self.trust / scales) ** 2
+        return np.concatenate([[scales.size, self.forgetting], caps, [self.trust**2, self.drift**2]])
 
     def initial_state(self, scales: Floats) -> Floats:
         """Return the initial covariance, diagonal, and room for scratch."""
-        return np.concatenate([np.diag((self.trust / scales) ** 2).ravel(), np.zeros(scales.size)])
+        return np.concatenate([np.diag((self.trust / scales) ** 2).ravel(), np.zeros(2 * scales.size + 2)])
 
     def information(self, state: Floats, scales: Floats) -> Floats:
         """Return the inverse of the covariance."""
@@ -87,4 +150,4 @@ class Rls(Learner):
 
     def to_dict(self) -> dict[str, Any]:
         """Return name, forgetting and trust."""
-        return {"learner": self.name, "forgetting": self.forgetting, "trust": self.trust}
+        return {"learner": self.name, "forgetting": self.forgetting, "trust": self.trust, "drift": self.drift}

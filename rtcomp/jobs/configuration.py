@@ -15,6 +15,7 @@ from rtcomp.control.references import Reference, build_reference, check
 from rtcomp.errors import ConfigError, LimitError
 from rtcomp.hysteresis import Basis, Learner, basis_named, build_learner
 from rtcomp.hysteresis.interval import IntervalBasis
+from rtcomp.hysteresis.self_placing import SelfPlacingBasis
 from rtcomp.jobs.arming import Arming
 from rtcomp.jobs.limit_settings import Limits, Loop, Positive
 from rtcomp.stage.schema import StageFile
@@ -27,7 +28,7 @@ Times = Annotated[list[Annotated[float, Field(ge=0)]], Field(min_length=2, max_l
 class Identify(Section):
     """The section ``identify``: the model and how it learns."""
 
-    model: str = Field("interval", description="basis: interval, stop, extended-stop, preisach")
+    model: str = Field("interval", description="basis: interval, self-placing, stop, extended-stop, preisach")
     intervals: int = Field(20, ge=1, le=100_000, description="number of elements")
     range: Positive | None = Field(None, description="m, from full saturation to full saturation")
     spacing: float = Field(1.0, ge=1e-3, le=1e3, description="last width over first")
@@ -64,8 +65,8 @@ class Identify(Section):
             says = "range and widths are both given; the widths alone say where the intervals lie"
             raise ConfigError(says, key=("range",))
         for key, given in (("prior", self.prior != "none"), ("widths", self.widths is not None)):
-            if given and self.model != "interval":
-                raise ConfigError(f"speaks of the interval model; model is {self.model!r}", key=(key,))
+            if given and self.model not in ("interval", SelfPlacingBasis.name):
+                raise ConfigError(f"speaks of intervals; model is {self.model!r}", key=(key,))
         if self.learn is not None:
             _in_order(self.learn, ("learn",))
         return self
@@ -262,12 +263,19 @@ class Configuration:
         """Return the hysteresis basis that ``identify`` asks for."""
         section = self.identify
         if section.widths is not None:
-            return IntervalBasis(section.widths)
+            return self.moving(IntervalBasis(section.widths))
         assert section.range is not None
         try:
             return basis_named(section.model).over(section.intervals, section.range, section.spacing)
         except ConfigError as error:
             raise self.file.error(("identify", *error.key), str(error)) from error
+
+    def moving(self, basis: Basis) -> Basis:
+        """Return a model's basis, its intervals free to move on where ``identify`` asks for that."""
+        section = self.run.identify
+        if section is None or section.model != SelfPlacingBasis.name or not isinstance(basis, IntervalBasis):
+            return basis
+        return SelfPlacingBasis(basis.widths)
 
     def learner(self) -> Learner:
         """Return the learner that ``identify`` asks for."""

@@ -201,7 +201,7 @@ def learned_positions(config: Configuration, run: Run) -> Floats:
 def model_of(config: Configuration, tick: Tick, positions: Floats) -> HysteresisModel:
     """Take the weights out of a tick, with the prior applied, as a model."""
     weights = tick.weights.copy()
-    basis = tick.basis
+    basis = tick.settled_basis
     if config.identify.prior == "non-increasing" and isinstance(basis, IntervalBasis):
         information = tick.learner.information(tick.identifier.ls, tick.scales)
         weights = non_increasing(weights, information, free=1)

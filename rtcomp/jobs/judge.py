@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rtcomp.hysteresis.basis import Basis, regressors
+from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.kernels import Floats
 from rtcomp.stage.balance import bandwidth, known_force, zero_phase
@@ -103,8 +104,32 @@ def learning_curve(
     window: tuple[float, float] | None = None,
     settle: float = 0.0,
 ) -> Floats:
-    """Return the relative error of each set of weights in `history` (M, N + 1), frozen, on `friction`."""
+    """Return the relative error of each set of weights in `history`, frozen, on `friction`, (M,).
+
+    history: (M, N + 1), or (M, 2 N + 1) with the widths (m) that the intervals had then.
+    """
     counted = _counted(friction, window, settle)
+    if history.shape[1] > basis.size + 1:
+        return _of_moving(basis.size, history, offset_scale, friction, counted)
+    return _curve(basis, history, offset_scale, friction, counted)
+
+
+def _of_moving(
+    count: int, history: Floats, offset_scale: float, friction: Friction, counted: npt.NDArray[np.bool_]
+) -> Floats:
+    """Return the curve of intervals that moved, from stretch to stretch in which they did not."""
+    weights, widths = history[:, : count + 1], history[:, count + 1 :]
+    moved = np.flatnonzero((np.diff(widths, axis=0) != 0.0).any(axis=1)) + 1
+    parts = []
+    for low, high in zip([0, *moved], [*moved, len(history)], strict=True):
+        basis = IntervalBasis(widths[low])
+        parts.append(_curve(basis, weights[low:high], offset_scale, friction, counted))
+    return np.concatenate(parts)
+
+
+def _curve(
+    basis: Basis, history: Floats, offset_scale: float, friction: Friction, counted: npt.NDArray[np.bool_]
+) -> Floats:
     x = np.column_stack([regressors(basis, friction.position), np.full(counted.size, offset_scale)])[counted]
     force = friction.force[counted]
     gram, cross, power = x.T @ x, x.T @ force, float(force @ force)

@@ -67,7 +67,8 @@ class Run:
     weights_time: Floats
     """s, (M,)."""
     weights: Floats
-    """(M, N + 1): the weights and the offset's weight, every `WEIGHTS_EVERY` seconds."""
+    """(M, N + 1): the weights and the offset's weight, every `WEIGHTS_EVERY` seconds; where the elements
+    move, (M, 2 N + 1) with their widths (m) then."""
     outcome: Outcome
     tick: Tick
     delay_ticks: int
@@ -149,7 +150,7 @@ def make_tick(
     section = config.run.identify
     stage = config.stage
     if model is not None:
-        basis = model.basis
+        basis = config.moving(model.basis)
     else:
         # Without a section identify nothing learns: a basis of one interval fills the place.
         basis = config.basis() if section is not None else IntervalBasis([1.0])
@@ -210,8 +211,8 @@ def run_loop(
             if path is not None:
                 about = describe(config, tick, metadata)
                 recorder = Recorder.start(
-                    path, ring, columns, about, weights_columns=tick.weights.size, axis=config.stage.axis,
-                    later=tuple(in_loop),
+                    path, ring, columns, about, weights_columns=tick.row_width - len(columns),
+                    axis=config.stage.axis, later=tuple(in_loop),
                 )  # fmt: skip
             stop = stack.enter_context(stop_on_signals())
             if tick.closed_loop:

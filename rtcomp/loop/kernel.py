@@ -14,7 +14,8 @@ from rtcomp.control.limits import FLAGS, limit_step
 from rtcomp.control.limits import NOT_FINITE as NO_NUMBER
 from rtcomp.control.pid import INTEGRAL, INTEGRAL_LIMIT, KI, LAST_INPUT, ON_MEASUREMENT, pid_step
 from rtcomp.hysteresis.conditioning import settle, smooth
-from rtcomp.kernels import Floats, call_basis, call_learner, compiled
+from rtcomp.hysteresis.places import CHANGED
+from rtcomp.kernels import Floats, call_basis, call_learner, call_placing, call_regroup, compiled
 from rtcomp.loop import layout as at
 from rtcomp.loop.checks import STALE_STATUS, check, is_new
 from rtcomp.loop.pace import degrade, keep_pace, lose_slot
@@ -43,6 +44,13 @@ class Identifier(NamedTuple):
     ls_start: Floats
     """The learner's state and the weights at the start: what a divergence goes back to."""
     w_start: Floats
+    scales: Floats
+    """Amplitude of each regressor (m), the offset's too."""
+    placing: int
+    """What moves the elements, 0 where they stay; its memory, and what it changed last."""
+    places: Floats
+    change: Floats
+    regroup: int
 
 
 class Compensator(NamedTuple):
@@ -57,7 +65,9 @@ class Compensator(NamedTuple):
 
 
 @compiled
-def identify(i: Identifier, settings: Floats, state: Floats, known: float, learn: float, row: Floats) -> None:
+def identify(
+    i: Identifier, c: Compensator, settings: Floats, state: Floats, known: float, learn: float, row: Floats
+) -> None:
     """Feed the measurement of one tick ago, whose force is known by now, to the basis and the learner.
 
     The command is constant between ticks, so the force around a sample is the mean of the commands before
@@ -86,13 +96,30 @@ def identify(i: Identifier, settings: Floats, state: Floats, known: float, learn
     else:  # noise alone would move the weights without end
         state[at.RESTED] += 1.0
     may = state[at.HELD] == 0.0 and (state[at.RESTED] < at.REST_TICKS or settings[at.COUNT] == 0.0)
-    if learn > 0.0 and may and moved >= settings[at.GATE] and math.isfinite(error):
+    learns = learn > 0.0 and may and moved >= settings[at.GATE] and math.isfinite(error)
+    if learns:
         state[at.LEARNED_AT] = position
         state[at.UPDATES] += 1.0
         call_learner(i.learner, i.lp.ctypes.data, i.ls.ctypes.data, i.x.ctypes.data, i.w.ctypes.data, error)
         row[at.ROW_LEARNING] = 1.0
         if not (abs(says(i)) < settings[at.FORCE_BOUND] and sound(i.ls, int(state[at.UPDATES]))):
             put_aside(i, state)
+    if i.placing != 0 and learn > 0.0 and state[at.HELD] == 0.0 and math.isfinite(force):
+        move_elements(i, c, force, error if learns else math.nan)
+
+
+@compiled
+def move_elements(i: Identifier, c: Compensator, force: float, error: float) -> None:
+    """Let the elements of the basis move, and the learner's memory follow them."""
+    call_placing(
+        i.placing, i.bp.ctypes.data, i.bs.ctypes.data, i.x.ctypes.data, c.bs.ctypes.data, c.x.ctypes.data,
+        i.w.ctypes.data, i.w_start.ctypes.data, i.scales.ctypes.data, i.places.ctypes.data,
+        i.change.ctypes.data, force, error,
+    )  # fmt: skip
+    if i.change[CHANGED] > 0.0:
+        for state in (i.ls, i.ls_start):
+            call_regroup(i.regroup, i.lp.ctypes.data, state.ctypes.data, i.scales.ctypes.data,
+                         i.change.ctypes.data)  # fmt: skip
 
 
 @compiled
@@ -198,7 +225,7 @@ def tick_kernel(
     if fresh and row[at.ROW_OVERRUN] == 0.0:
         # The commands around the last sample are known to have acted as they were timed.
         if state[at.GOOD] >= 2.0 + settings[at.DELAY]:
-            identify(i, settings, state, plan[at.KNOWN], plan[at.LEARN], row)
+            identify(i, c, settings, state, plan[at.KNOWN], plan[at.LEARN], row)
         state[at.GOOD] += 1.0
     else:
         state[at.GOOD] = 0.0
@@ -248,6 +275,9 @@ def tick_kernel(
     row[at.ROW_VOLTAGE] = volts
     for j in range(i.w.size):
         row[_COLUMNS + j] = i.w[j]
+    if i.placing != 0:
+        for j in range(i.w.size - 1):
+            row[_COLUMNS + i.w.size + j] = 2.0 * i.scales[j]
     push(header, rows, row)
     return volts
 

@@ -15,11 +15,12 @@ import numpy as np
 from rtcomp.errors import DeviceError, EmergencyStopError, LimitError, RtcompError
 from rtcomp.kernels import Floats
 from rtcomp.loop import layout as at
+from rtcomp.loop.bound import BoundTick
 from rtcomp.loop.clock import Clock, VirtualClock
 from rtcomp.loop.device import OK, Armable, Device, EndOfRun
 from rtcomp.loop.ring import STOPPED, Ring
 from rtcomp.loop.states import HOLDING, Machine, State, Step
-from rtcomp.loop.tick import Compensator, Identifier, Tick, lost_kernel, tick_kernel
+from rtcomp.loop.tick import Compensator, Identifier, Tick, lost_kernel
 from rtcomp.loop.trips import STOPPED_BY, trip
 
 BLOCK = 100_000
@@ -136,6 +137,7 @@ def run(
     # What was only looked at is at zero and is not armed, not even to be told so.
     untouched = isinstance(device, Armable)
     warm_up(tick)
+    bound = BoundTick(tick.identifier, tick.compensator, settings, state, row, header, rows)
     try:
         # References of 100,000 ticks take tens of milliseconds: between two deadlines that is slots lost.
         first, last = 0, min(BLOCK, plan.ticks) if virtual else plan.ticks
@@ -186,9 +188,7 @@ def run(
             row[at.ROW_LATENESS] = lateness * 1e6
             row[at.ROW_EXECUTION] = state[at.COMPUTED]
             row[at.ROW_OVERRUN] = float(is_late or missed > 0)
-            volts = tick_kernel(
-                block[done - first], tick.identifier, tick.compensator, settings, state, row, header, rows
-            )
+            volts = bound(block[done - first])
             done += 1
             state[at.COMPUTED] = (time.perf_counter_ns() - woken) * 1e-3
             if state[at.MODE] != mode:
@@ -294,9 +294,10 @@ def warm_up(tick: Tick) -> None:
     identifier = Identifier(*(a.copy() if isinstance(a, np.ndarray) else a for a in tick.identifier))  # type: ignore[arg-type]
     compensator = Compensator(*(a.copy() for a in tick.compensator))
     state, row = tick.state.copy(), tick.row.copy()
+    bound = BoundTick(identifier, compensator, tick.settings, state, row, scratch.header, scratch.rows)
     for k in range(4):
         row[at.ROW_POSITION] = 1e-9 * k
         row[at.ROW_SEQUENCE] = k + 1.0
-        tick_kernel(plan, identifier, compensator, tick.settings, state, row, scratch.header, scratch.rows)
+        bound(plan)
     lost_kernel(plan, tick.settings, row, state, scratch.header, scratch.rows)
     scratch.release()

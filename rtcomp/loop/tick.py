@@ -15,7 +15,8 @@ import numpy as np
 
 from rtcomp.hysteresis.basis import Basis
 from rtcomp.hysteresis.conditioning import memory
-from rtcomp.hysteresis.learner import Learner
+from rtcomp.hysteresis.learner import Learner, followed
+from rtcomp.hysteresis.places import CHANGE_WIDTH
 from rtcomp.kernels import Floats
 from rtcomp.loop import layout as at
 from rtcomp.loop.kernel import Compensator, Identifier, lost_kernel, tick_kernel
@@ -117,11 +118,13 @@ class Tick:
         self.basis, self.learner, self.scales = basis, learner, all_scales
         x, lead_x = np.zeros(n + 1), np.zeros(n + 1)
         x[n] = lead_x[n] = offset_scale
+        moving, follow = followed(basis, learner)
         self.identifier = Identifier(
             basis.kernel.address, basis.vector(), basis.initial_state(), x,
             learner.kernel.address, learner.vector(all_scales), learner.initial_state(all_scales),
             self.weights, sections, memory(sections), memory(sections),
-            learner.initial_state(all_scales), self.weights.copy(),
+            learner.initial_state(all_scales), self.weights.copy(), all_scales,
+            moving, basis.memory(settings.gate), np.zeros(CHANGE_WIDTH), follow,
         )  # fmt: skip
         self.compensator = Compensator(basis.initial_state(), lead_x, *pid, *limits)
         s = settings
@@ -137,12 +140,17 @@ class Tick:
         self.state[at.MODE] = State.CONNECTED
         self.state[at.SHARE] = self.state[at.LAST_SHARE] = 1.0
         self.state[[at.MEASURED_AT, at.MEASURED_SPEED]] = math.nan
-        self.row: Floats = np.zeros(len(COLUMNS) + n + 1)
+        self.row: Floats = np.zeros(len(COLUMNS) + n + 1 + (n if moving else 0))
 
     @property
     def row_width(self) -> int:
-        """Numbers in a row of the ring: the columns, the weights, the offset."""
+        """Numbers in a row of the ring: columns, weights, offset, and the widths where they change."""
         return int(self.row.size)
+
+    @property
+    def settled_basis(self) -> Basis:
+        """The basis with its elements where they are now."""
+        return self.basis.settled(self.identifier.bp)
 
     @property
     def delay_ticks(self) -> int:

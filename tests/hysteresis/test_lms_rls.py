@@ -130,7 +130,7 @@ def test_rls_does_not_wind_up(forgetting, excited):
 
     repeat(learner.kernel.address, p, s, x, w, 0.0 if x.any() else 1.0, rounds)
     covariance = s[:16].reshape(4, 4)
-    caps = p[2:]
+    caps = p[2:-2]
     assert (np.diag(covariance) <= caps * (1 + 1e-9)).all() and (np.diag(covariance) > 0).all()
     normal = covariance / np.sqrt(np.outer(caps, caps))
     assert np.allclose(normal, normal.T) and np.linalg.eigvalsh(normal).min() > -1e-12
@@ -170,3 +170,41 @@ def test_settings_of_the_wrong_type_are_refused_too(entry):
     with pytest.raises(ConfigError) as caught:
         build_learner(entry)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("change", [0.3, -0.3])
+def test_friction_that_drifts_as_a_whole_is_followed(change):
+    """30 % within 10,000 updates: with `drift` the weights stay where the friction is, without they lag."""
+    basis = IntervalBasis.over(12, 1.0)
+    true = np.linspace(5.0, 0.5, 12)
+    time = np.arange(20_000) / 1000.0
+    u = 0.6 * (0.2 + 0.8 * np.abs(np.sin(0.8 * time))) * np.sin(2 * np.pi * time)
+    level = 1.0 + change * np.clip((time - 10.0) / 10.0, 0.0, 1.0)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(time.size)
+    force = regressors(basis, u) @ true * level + noise
+    off = {}
+    for drift in (0.0, 1e-4):
+        w = learn(basis, Rls(0.9995, drift=drift), u, force)
+        off[drift] = np.linalg.norm(w / (1.0 + change) - true) / np.linalg.norm(true)
+    assert off[1e-4] < 0.03 and off[1e-4] < 0.3 * off[0.0]
+
+
+def test_drift_adds_nothing_where_nothing_is_excited():
+    """Along the weights the variance would grow without end: it stops at its cap, as forgetting does."""
+    learner, scales = Rls(0.9995, drift=0.01), np.ones(5)
+    p, s, w = learner.vector(scales), learner.initial_state(scales), np.full(5, 3.0)
+    draw = np.random.default_rng(0)
+    for _ in range(300):
+        learner.kernel(p, s, draw.uniform(-1.0, 1.0, 5), w, 0.1 * draw.standard_normal())
+    before = w.copy()
+    for _ in range(20_000):
+        learner.kernel(p, s, np.zeros(5), w, 1.0)
+    covariance = s[:25].reshape(5, 5)
+    assert (np.diag(covariance) <= p[2:-2] * (1 + 1e-9)).all() and np.array_equal(covariance, covariance.T)
+    assert np.array_equal(w, before) and (np.linalg.eigvalsh(covariance) > 0).all()
+
+
+@pytest.mark.parametrize("drift", [-1e-9, 0.2, np.nan])
+def test_drift_has_a_range(drift):
+    with pytest.raises(ConfigError, match=r"drift is .*; allowed is 0 to 0\.1"):
+        Rls(drift=drift)

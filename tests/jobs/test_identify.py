@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtcomp.errors import RecordingError
+from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.identify import follow, friction, friction_level, identify
@@ -179,3 +179,37 @@ def test_a_measured_joint(shared_data):
     # Beyond what was learned from: the last intervals were never reached.
     assert done.held_out.relative < 0.15
     assert (np.diff(done.model.weights) <= 1e-9 * done.model.weights.max()).all()
+
+
+def test_intervals_place_themselves_in_the_loop(leuven, tmp_path):
+    """From equal intervals over a range far too large to a model as good as one laid out by hand."""
+    section = {**leuven.file.data["identify"], "range": 1e-3, "spacing": 1.0}
+    equal = identify(leuven.changed(identify=section))
+    done = identify(leuven.changed(identify={**section, "model": "self-placing"}), out=tmp_path)
+    assert done.held_out.relative < 0.5 * equal.held_out.relative and done.held_out.relative < 0.02
+    basis = done.model.basis
+    assert basis.name == "interval" and basis.size == 20 and basis.widths.sum() == pytest.approx(1e-3)
+    assert np.count_nonzero(done.model.reached) > 2 * np.count_nonzero(equal.model.reached)
+    # The curve is of the intervals as they lay at each moment, and ends at the model without its prior.
+    assert done.run.weights.shape[1] == 2 * 20 + 1
+    assert np.allclose(done.run.weights[:, 21:].sum(axis=1), 1e-3)
+    assert len(np.unique(done.run.weights[:, 21], axis=0)) > 1
+    assert done.curve[-1] < 0.03 and done.curve[-1] < 0.1 * done.curve[0]
+    again = HysteresisModel.from_dict(done.model.to_dict())
+    assert np.array_equal(again.weights, done.model.weights)
+
+
+def test_a_model_s_intervals_go_on_moving_where_that_is_asked_for(leuven):
+    config = leuven.changed(identify={**leuven.file.data["identify"], "model": "self-placing"})
+    from rtcomp.hysteresis.interval import IntervalBasis
+
+    given = IntervalBasis([1e-6, 4e-6])
+    assert config.moving(given).name == "self-placing"
+    assert np.array_equal(config.moving(given).widths, given.widths)
+    assert leuven.moving(given) is given
+
+
+def test_more_intervals_than_can_move_are_refused_in_one_line(leuven):
+    section = {**leuven.file.data["identify"], "model": "self-placing", "intervals": 1001}
+    with pytest.raises(ConfigError, match=r"leuven.yaml:\d+.*1001 intervals; allowed are 1 to 1000"):
+        leuven.changed(identify=section).basis()

@@ -107,7 +107,7 @@ def test_at_rest_nothing_is_learned_that_matters():
     table[1000:, at.LEAD_FORCE] = 0.0
     left = go(device(stage(noise=2e-9)), tick(learner=Rls(0.999), **STRICT), TablePlan(table))
     covariance = left.tick.identifier.ls
-    cap = Rls(0.999).vector(left.tick.scales)[2:].max()
+    cap = Rls(0.999).vector(left.tick.scales)[2:-2].max()
     assert np.isfinite(covariance).all() and np.abs(covariance).max() <= 1.01 * cap
     before, after = left.weights[1500], left.weights[-1]
     scales = left.tick.scales
