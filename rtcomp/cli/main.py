@@ -32,6 +32,7 @@ COMMANDS = {
     "compensate": ("rtcomp.cli.compensate:compensate", "Follow a reference with the friction cancelled."),
     "diagnose": ("rtcomp.cli.diagnose:diagnose", "Say which physics a stage leaves out of recordings."),
     "replay": ("rtcomp.cli.replay:replay", "Put a stage's force balance beside a recording, row by row."),
+    "inspect": ("rtcomp.cli.inspect:inspect", "Test a recorded hysteresis: symmetric, congruent, closed?"),
     "trial": ("rtcomp.cli.trial:trial", "Prove the diagnosis on cases whose answers are sealed."),
     "convert": ("rtcomp.cli.convert:convert", "Turn a recording into another format."),
     "drivers": ("rtcomp.cli.drivers:drivers", "List the installed drivers and their settings."),

@@ -12,7 +12,7 @@ import pytest
 from command import CONFIG, motion, refused, rtcomp, write
 
 FORMATS = ["log.csv", "log.h5", "log.mat", "log.73.mat"]
-COMMANDS = ("convert", "identify", "replay", "simulate")
+COMMANDS = ("convert", "identify", "replay", "simulate", "inspect")
 Columns = dict[str, np.ndarray]
 
 
@@ -34,6 +34,7 @@ def arguments(command: str, recording: str) -> list[str]:
         "convert": ["convert", recording, "other.h5", "--force", "--json"],
         "identify": ["identify", "run.yaml", recording, "--out", "results", "--force", "--json"],
         "simulate": ["simulate", "run.yaml", "--voltage", recording, "--out", "results", "--force", "--json"],
+        "inspect": ["inspect", recording, "--stage", "run.yaml", "--out", "results", "--force", "--json"],
         "replay": ["replay", recording, "--stage", "run.yaml", "--out", "replay.csv", "--force", "--json"],
     }[command]
 
@@ -55,12 +56,12 @@ def going_back(columns: Columns) -> Columns:
 
 UNUSABLE: list[tuple[str, Callable[[Columns], Columns], list[str], tuple[str, ...]]] = [
     ("NaN in position", changed("position", np.nan, [41, 60]), ["position is NaN in row 42", "2 of its 600"],
-     ("convert", "identify", "replay")),
+     ("convert", "identify", "replay", "inspect")),
     ("infinity in voltage", changed("voltage", np.inf, [7]), ["voltage is infinite in row 8", "1 of its 600"],
      COMMANDS),
     ("NaN in time", changed("time", np.nan, [7]), ["time is NaN in row 8"], COMMANDS),
     ("constant position", changed("position", 3e-3, slice(None)), ["position is constant (0.003 in all 600"],
-     ("convert", "identify", "replay")),
+     ("convert", "identify", "replay", "inspect")),
     ("time goes back", going_back, ["time goes back in row 301", "0.299 s to 0.2 s"], COMMANDS),
     ("too few rows", lambda c: {k: v[:9] for k, v in c.items()}, ["has 9 rows; at least 16"], COMMANDS),
     ("no voltage", lambda c: {k: v for k, v in c.items() if k != "voltage"},

@@ -21,6 +21,7 @@ from rtcomp.report.figures import (
     tracking_figure,
     virgin_figure,
 )
+from rtcomp.report.figures.branches import branches_figure, difference_figure, mirrored_figure
 from rtcomp.report.page import Page, Section, write_page
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -51,6 +52,9 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
         lateness_figure(np.abs(np.random.default_rng(1).standard_cauchy(5000)), period_us=1000.0),
         lateness_figure(np.zeros(100)),
         tracking_figure(None, (nothing, nothing)),
+        branches_figure([(x[:1500], t[:1500])], [(x[1600:4600], t[1600:4600])], [(x[5000:], t[5000:])]),
+        mirrored_figure([(x[:1500], t[:1500])], [(-x[:1500], -t[:1500])]),
+        difference_figure(np.linspace(-3e-5, 3e-5, 50), np.arange(50.0), 2.0),
     ]
     page = Page("Browser", sections=[Section(f"Figure {i}", "", f) for i, f in enumerate(figures)])
     return write_page(tmp_path_factory.mktemp("page") / "report.html", page)
@@ -72,9 +76,9 @@ def test_every_plot_is_drawn_without_an_error(report: Path, tmp_path: Path, dark
     document, console = opened(report, tmp_path, f"--blink-settings=preferredColorScheme={0 if dark else 1}")
     root = re.search(r"<html[^>]*>", document)
     assert root is not None
-    assert 'data-plots="8"' in root[0] and 'data-errors="0"' in root[0]
+    assert 'data-plots="11"' in root[0] and 'data-errors="0"' in root[0]
     assert console == ""
-    assert document.count('class="main-svg"') >= 8
+    assert document.count('class="main-svg"') >= 11
     body = document[document.index("<main>") : document.index('<script type="application/json"')]
     assert "no data" in body
     # Colours of the drawn lines are those of the page.
