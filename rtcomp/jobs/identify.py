@@ -17,6 +17,7 @@ from rtcomp.jobs.arming import permit
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.judge import Friction, Judgement, friction_of, judge, learning_curve, reached
 from rtcomp.jobs.lead import NOTHING, lead_volts
+from rtcomp.jobs.motion_notes import motion_notes
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
 from rtcomp.jobs.session import Run, Watch, check, make_device, make_tick, run_loop, stopped
 from rtcomp.kernels import Floats
@@ -100,7 +101,7 @@ def identify(
     settle = min(settle, 0.5 * float(learned.columns["time"][-1]))
     in_sample = judge(model, own, settle=settle)
     held_out, on, number = None, own, None
-    notes = [*learned.remarks, *never_reached(model)]
+    notes = [*learned.remarks, *motion_notes(model, learned_positions(config, learned))]
     unjudged = "the model was not judged on other motion"
     if learned.outcome.stopped_by == "signal":
         number = learned.signal
@@ -211,17 +212,6 @@ def model_of(config: Configuration, tick: Tick, positions: Floats) -> Hysteresis
     return HysteresisModel(basis, weights[:-1], weights[-1] * tick.offset_scale, part)
 
 
-def never_reached(model: HysteresisModel) -> list[str]:
-    """Say which elements the motion never exercised."""
-    if model.reached is None or bool((model.reached > 0).all()):
-        return []
-    missing = np.flatnonzero(model.reached == 0) + 1
-    return [
-        f"elements {missing[0]} to {missing[-1]} of {model.basis.size} were never reached; "
-        "their weights are 0: move further, or make identify.range smaller"
-    ]
-
-
 def _from_recording(
     config: Configuration, recording: Recording, out: Path | None, watch: Watch | None
 ) -> Identified:
@@ -273,7 +263,7 @@ def _from_recording(
         own,
         (window[0], window[1]) if window is not None else (first, last),
     )
-    notes = [*recording.notes, *never_reached(model)]
+    notes = [*recording.notes, *motion_notes(model, recording.position[time <= learn_end])]
     return Identified(config, model, learned, in_sample, held_out, learned.weights_time, curve, notes)
 
 

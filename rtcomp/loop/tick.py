@@ -16,7 +16,7 @@ import numpy as np
 from rtcomp.hysteresis.basis import Basis
 from rtcomp.hysteresis.conditioning import memory
 from rtcomp.hysteresis.learner import Learner, followed
-from rtcomp.hysteresis.places import CHANGE_WIDTH
+from rtcomp.hysteresis.places import CHANGE_WIDTH, MOVES
 from rtcomp.kernels import Floats
 from rtcomp.loop import layout as at
 from rtcomp.loop.kernel import Compensator, Identifier, lost_kernel, tick_kernel
@@ -151,6 +151,11 @@ class Tick:
     def settled_basis(self) -> Basis:
         """The basis with its elements where they are now."""
         return self.basis.settled(self.identifier.bp)
+
+    @property
+    def moves(self) -> int | None:
+        """How often an element of the basis moved; None where they stay."""
+        return int(self.identifier.places[MOVES]) if self.identifier.placing else None
 
     @property
     def delay_ticks(self) -> int:

@@ -49,6 +49,8 @@ def identified_rows(done: Identified) -> list[Row]:
     if done.model.reached is not None:
         count = int(np.count_nonzero(done.model.reached))
         rows.append(Row("Elements reached", f"{count} of {done.model.basis.size}"))
+    if done.run.tick.moves is not None:
+        rows.append(Row("Intervals moved", f"{done.run.tick.moves:,} times", "", "to where the curve bends"))
     rows.append(Row("Updates of the weights", f"{done.run.outcome.updates:,}"))
     return rows + timing_rows(done.run)
 

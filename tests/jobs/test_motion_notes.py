@@ -1,0 +1,49 @@
+"""What a motion leaves open of the model learned from it is said, and only then."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rtcomp.hysteresis.interval import IntervalBasis
+from rtcomp.hysteresis.model import HysteresisModel
+from rtcomp.jobs.identify import identify
+from rtcomp.jobs.judge import reached
+from rtcomp.jobs.motion_notes import motion_notes
+from rtcomp.recording.reader import read
+
+TIME = np.arange(4000) / 1000.0
+LOOP = 6e-5 * np.sin(2 * np.pi * TIME)
+BASIS = IntervalBasis.over(20, 1e-4)
+
+
+def notes(position):
+    model = HysteresisModel(BASIS, np.ones(20), reached=reached(BASIS, position))
+    return motion_notes(model, position)
+
+
+def test_an_ordinary_motion_needs_no_remark():
+    assert notes(LOOP) == []
+
+
+@pytest.mark.parametrize(
+    ("position", "says"),
+    [
+        (1e-4 * TIME, "one way only"),
+        (-1e-4 * TIME, "one way only"),
+        (1e-4 * TIME + 1e-8 * np.random.default_rng(0).standard_normal(4000), "one way only"),
+        (np.round(LOOP / 1e-5) * 1e-5, "20 elements, but only 13 distinct positions"),
+        (1e-2 * np.sin(2 * np.pi * TIME), "200 times identify.range"),
+        (0.3 * LOOP, "elements 9 to 20 of 20 were never reached"),
+    ],
+)
+def test_what_the_motion_lacks_is_said_once(position, says):
+    found = notes(position)
+    assert len(found) == 1 and says in found[0] and "\n" not in found[0]
+
+
+def test_they_reach_the_user(leuven, tmp_path):
+    path = tmp_path / "oneway.csv"
+    rows = np.column_stack([TIME, 1e-4 * TIME / 4, 0.2 * np.tanh(TIME)])
+    np.savetxt(path, rows, delimiter=",", header="time,position,voltage", comments="")
+    assert any("one way only" in note for note in identify(leuven, read(path)).notes)
