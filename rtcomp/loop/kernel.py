@@ -92,9 +92,12 @@ def identify(
     error = force - model
     moved = abs(position - state[at.LEARNED_AT])
     if abs(position - state[at.RESTED_AT]) > settings[at.COUNT]:
-        state[at.RESTED_AT] = position
-        state[at.RESTED] = 0.0
+        state[at.BEYOND] += 1.0
+        if state[at.BEYOND] >= at.MOVES_TICKS or state[at.RESTED] < at.REST_TICKS:
+            state[at.RESTED_AT] = position
+            state[at.RESTED] = state[at.BEYOND] = 0.0
     else:  # noise alone would move the weights without end
+        state[at.BEYOND] = 0.0
         state[at.RESTED] += 1.0
     may = state[at.HELD] == 0.0 and (state[at.RESTED] < at.REST_TICKS or settings[at.COUNT] == 0.0)
     learns = learn > 0.0 and may and moved >= settings[at.GATE] and math.isfinite(error)

@@ -45,8 +45,8 @@ not believed."""
     LATE_RUN, LATE_BITS, LATE_SUM, CLEAN, LOST, HELD, DIVERGED, DEGRADED_TIMES,
     AGE, INVALID_RUN, REPEATED_RUN, REPEATED, LAST_SEQUENCE, LAST_TIME,
     MEASURED_AT, MEASURED_SPEED, SINCE, RESTED, RESTED_AT, STUCK_RUN, STUCK_AT, PUSHED, PUSHED_AT,
-    PUSHED_MID, TRIED, OWN_OFF, KEPT_OFF, TAKEN_BACK, HISTORY,
-) = range(46)  # fmt: skip
+    PUSHED_MID, TRIED, OWN_OFF, KEPT_OFF, TAKEN_BACK, BEYOND, HISTORY,
+) = range(47)  # fmt: skip
 """State: good samples in a row until now; positions one and two ticks ago (m); reference one tick ago (m);
 position at the last update (m); what the limits cut from the last command (V); what the check found;
 execution time of the last tick (us); updates of the weights; whether there was a sample.
@@ -63,8 +63,8 @@ and the ticks since; ticks at rest, and where (m); ticks stuck, and where (m); t
 and where that began and was half over (m).
 
 Of the guard: updates since the weights kept; mean squares of what the weights and those kept did not foresee
-(N^2); how often the weights were taken back to those. From here on the commands of the last ticks, newest
-first (V)."""
+(N^2); how often the weights were taken back to those. Ticks in a row in which a resting axis was elsewhere.
+From here on the commands of the last ticks, newest first (V)."""
 
 LATE_IN_ROW, LATE_OF, WINDOW, CLEAN_TICKS = 3, 8, 32, 32
 """Late ticks in a row, and among the last `WINDOW`, that degrade; ticks in time after which it is over."""
@@ -77,6 +77,8 @@ REPEATED_TICKS = 5
 """Samples in a row that say they are new and are not, after which the device is not believed."""
 REST_TICKS = 100.0
 """Ticks within a count of one place after which the axis rests: there is nothing to learn from."""
+MOVES_TICKS = 3.0
+"""Ticks in a row that a resting axis must be elsewhere before it moves: noise is, now and then, for one."""
 HELD_TICKS = 1000.0
 """Ticks that a diverged identifier is put aside."""
 SETTLING, COMPARED, KEPT_EVERY = 500.0, 2000.0, 4000.0
