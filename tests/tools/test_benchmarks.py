@@ -108,6 +108,21 @@ def test_a_diagnosis_without_recordings_to_judge(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_places(tmp_path: Path) -> None:
+    found = figures(tmp_path, "bench_places.py", "--curves", 30)
+    for noise in ("0", "0.5"):
+        head = f"noise {noise} % of peak: "
+        assert found[head + "20 placed over 20 equal, median"]["met"]
+        assert found[head + "8 placed over 20 equal, median"]["value"] < 1.5
+    assert found["noise 0 % of peak: worst over equal"]["value"] < 1.5
+
+
+@pytest.mark.slow
+def test_drift(tmp_path: Path) -> None:
+    assert missed(figures(tmp_path, "bench_drift.py", "--minutes", 3)) == []
+
+
+@pytest.mark.slow
 def test_a_killed_run_keeps_its_file(tmp_path: Path) -> None:
     found = figures(tmp_path, "bench_kill.py", "--kills", 1)
     for who in ("loop", "loop and recorder"):
