@@ -77,7 +77,7 @@ REPEATED_TICKS = 5
 """Samples in a row that say they are new and are not, after which the device is not believed."""
 REST_TICKS = 100.0
 """Ticks within a count of one place after which the axis rests: there is nothing to learn from."""
-MOVES_TICKS = 3.0
+MOVES_TICKS = 10.0
 """Ticks in a row that a resting axis must be elsewhere before it moves: noise is, now and then, for one."""
 HELD_TICKS = 1000.0
 """Ticks that a diverged identifier is put aside."""
