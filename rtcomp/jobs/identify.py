@@ -10,9 +10,12 @@ import numpy as np
 
 from rtcomp.control.references import Reference
 from rtcomp.errors import Interrupted, RecordingError
+from rtcomp.hysteresis.basis import regressors
+from rtcomp.hysteresis.beyond import continued, passes
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.hysteresis.prior import non_increasing
+from rtcomp.hysteresis.shaped import ShapedIntervalBasis
 from rtcomp.jobs.arming import permit
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.judge import Friction, Judgement, friction_of, judge, learning_curve, reached
@@ -207,6 +210,11 @@ def model_of(config: Configuration, tick: Tick, positions: Floats) -> Hysteresis
         weights = non_increasing(weights, information, free=1)
     part = reached(basis, positions)
     weights[:-1][part == 0.0] = 0.0
+    if config.identify.beyond == "continue" and isinstance(basis, IntervalBasis | ShapedIntervalBasis):
+        n, cut = basis.widths.size, config.identify.smoothing
+        slow = zero_phase(positions, cut, 1.0 / config.period) if cut > 0.0 else positions
+        passed = passes(regressors(basis, slow)[:, :n], basis.widths)
+        weights[:n] = continued(weights[:n], basis.widths, passed)[0]
     return HysteresisModel(basis, weights[:-1], weights[-1] * tick.offset_scale, part)
 
 
@@ -215,6 +223,11 @@ def never_reached(model: HysteresisModel) -> list[str]:
     if model.reached is None or bool((model.reached > 0).all()):
         return []
     missing = np.flatnonzero(model.reached == 0) + 1
+    if model.weights[missing - 1].any():
+        return [
+            f"elements {missing[0]} to {missing[-1]} of {model.basis.size} were never reached; their weights "
+            "go on as those before them fall"
+        ]
     return [
         f"elements {missing[0]} to {missing[-1]} of {model.basis.size} were never reached; "
         "their weights are 0: move further, or make identify.range smaller"
