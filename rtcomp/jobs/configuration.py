@@ -25,11 +25,16 @@ from rtcomp.yamlfile import Section, YamlFile, load_yaml, validate
 Times = Annotated[list[Annotated[float, Field(ge=0)]], Field(min_length=2, max_length=2)]
 
 
+AUTO = "auto"
+"""In the place of a basis: the interval operator, and the shape that pays on motion not learned from."""
+MODELS = "basis: interval, shaped-interval, stop, extended-stop, preisach; or auto, the shape that pays"
+
+
 class Shape(Section):
     """The section ``identify.shape``: what the model shaped-interval adds to the interval operator."""
 
     parts: list[Literal["reversible", "position", "output"]] = Field(
-        default_factory=lambda: ["reversible", "position", "output"], description="what is added"
+        ["reversible", "position", "output"], description="what is added"
     )
     places: int = Field(5, ge=3, le=25, description="points of the range where weights may differ, odd")
     groups: int | None = Field(None, ge=1, description="of intervals whose weights differ alike; 4")
@@ -65,7 +70,8 @@ class Identify(Section):
     @field_validator("model")
     @classmethod
     def _known_basis(cls, value: str) -> str:
-        basis_named(value)
+        if value != AUTO:
+            basis_named(value)
         return value
 
     @field_validator("learner")
@@ -82,9 +88,9 @@ class Identify(Section):
             says = "range and widths are both given; the widths alone say where the intervals lie"
             raise ConfigError(says, key=("range",))
         for key, given in (("prior", self.prior != "none"), ("widths", self.widths is not None)):
-            if given and self.model != "interval":
+            if given and self.model not in ("interval", AUTO):
                 raise ConfigError(f"speaks of the interval model; model is {self.model!r}", key=(key,))
-        if self.beyond != "zero" and self.model not in ("interval", ShapedIntervalBasis.name):
+        if self.beyond != "zero" and self.model not in ("interval", ShapedIntervalBasis.name, AUTO):
             raise ConfigError(f"speaks of intervals; model is {self.model!r}", key=("beyond",))
         if self.shape is not None and self.model != ShapedIntervalBasis.name:
             raise ConfigError(f"speaks of the model shaped-interval; model is {self.model!r}", key=("shape",))
@@ -290,7 +296,8 @@ class Configuration:
             if section.shape is not None:
                 shape = section.shape.model_dump()
                 return ShapedIntervalBasis.over(section.intervals, section.range, section.spacing, **shape)
-            return basis_named(section.model).over(section.intervals, section.range, section.spacing)
+            name = IntervalBasis.name if section.model == AUTO else section.model
+            return basis_named(name).over(section.intervals, section.range, section.spacing)
         except ConfigError as error:
             raise self.file.error(("identify", *error.key), str(error)) from error
 

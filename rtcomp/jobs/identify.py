@@ -22,6 +22,7 @@ from rtcomp.jobs.judge import Friction, Judgement, friction_of, judge, learning_
 from rtcomp.jobs.lead import NOTHING, lead_volts
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
 from rtcomp.jobs.session import Run, Watch, check, make_device, make_tick, run_loop, stopped
+from rtcomp.jobs.shapes import that_pays
 from rtcomp.kernels import Floats
 from rtcomp.loop.device import Armable, Device
 from rtcomp.loop.tick import Tick
@@ -97,12 +98,13 @@ def identify(
     )
     model = model_of(config, learned.tick, learned_positions(config, learned))
     own = friction(config, learned)
+    model, shape_notes = that_pays(config, model, own, learning_window(config))
     settle = config.run.judge.settle
     # A run stopped early is judged all the same: on its second half at least.
     settle = min(settle, 0.5 * float(learned.columns["time"][-1]))
     in_sample = judge(model, own, settle=settle)
     held_out, on, number = None, own, None
-    notes = [*learned.remarks, *never_reached(model)]
+    notes = [*learned.remarks, *never_reached(model), *shape_notes]
     unjudged = "the model was not judged on other motion"
     if learned.outcome.stopped_by == "signal":
         number = learned.signal
@@ -114,7 +116,7 @@ def identify(
         except Interrupted as error:  # what has been learned is not thrown away
             number = error.number
             notes.append(f"judging {error}; {unjudged}")
-    curve = learning_curve(model.basis, learned.weights, learned.tick.offset_scale, on, settle=settle)
+    curve = learning_curve(learned.tick.basis, learned.weights, learned.tick.offset_scale, on, settle=settle)
     return Identified(config, model, learned, in_sample, held_out, learned.weights_time, curve, notes, number)
 
 
@@ -272,6 +274,7 @@ def _from_recording(
         smoothing,
         ~recording.trusted,
     )
+    model, shape_notes = that_pays(config, model, own, learning_window(config))
     window = config.run.judge.window
     settle = config.run.judge.settle
     first = config.identify.learn[0] if config.identify.learn is not None else 0.0
@@ -279,13 +282,13 @@ def _from_recording(
     in_sample = judge(model, own, (first, last), settle)
     held_out = judge(model, own, (window[0], window[1]), 0.0) if window is not None else None
     curve = learning_curve(
-        model.basis,
+        learned.tick.basis,
         learned.weights,
         learned.tick.offset_scale,
         own,
         (window[0], window[1]) if window is not None else (first, last),
     )
-    notes = [*recording.notes, *never_reached(model)]
+    notes = [*recording.notes, *never_reached(model), *shape_notes]
     return Identified(config, model, learned, in_sample, held_out, learned.weights_time, curve, notes)
 
 
