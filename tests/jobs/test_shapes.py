@@ -18,10 +18,10 @@ PLAIN = IntervalBasis.over(8, 2.0, 3.0)
 FALL = np.exp(-2.0 * np.cumsum(PLAIN.widths) / 2.0)
 
 
-def motion(basis, weights, rows=6000, noise=0.003, seed=1):
+def motion(basis, weights, rows=6000, noise=0.003, seed=1, size=1.3):
     rng = np.random.default_rng(seed)
     u = np.cumsum(rng.normal(0.0, 0.05, rows))
-    u = 1.3 * np.sin(u - u[0])
+    u = size * np.sin(u - u[0])
     force = regressors(basis, u) @ weights
     return Motion(
         u, force + noise * np.abs(force).max() * rng.normal(size=rows), np.ones(rows, dtype=np.bool_), 0.01
@@ -47,7 +47,7 @@ def test_the_parts_that_are_there_are_found(seed):
 
 def test_a_skew_is_found_and_its_size():
     truth = ShapedIntervalBasis(PLAIN.widths, [], skew=0.12)
-    choice = choose(PLAIN, Rls(1.0), motion(truth, FALL))
+    choice = choose(PLAIN, Rls(1.0), motion(truth, FALL, size=3.0))
     assert choice.chosen.skew == pytest.approx(0.12, abs=0.005) and choice.chosen.parts == ()
     assert choice.model.basis.skew == choice.chosen.skew
 
