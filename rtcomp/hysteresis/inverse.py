@@ -21,10 +21,10 @@ _HALVINGS = 60
 def inputs_for(
     model: HysteresisModel, outputs: Floats, low: float, high: float, start: float = 0.0
 ) -> tuple[Floats, Floats]:
-    """Return inputs (m or V, (K,)) within `low` to `high` with which `model` gives `outputs` (K,), and the rest.
+    """Return inputs (m or V, (K,)) within `low` to `high` that make `model` give `outputs` (K,), and a rest.
 
-    From the virgin state at the input `start`. The rest is wanted less given, (K,), in the output's unit: not
-    0 where a bound was met. Raises ConfigError where the bounds do not hold the start.
+    It goes from the virgin state at the input `start`. The rest is wanted less given, (K,), in the output's
+    unit: not 0 where a bound was met. Raises ConfigError where the bounds do not hold the start.
     """
     if not low <= start <= high or not low < high:
         raise ConfigError(f"inverse: the bounds are {low:g} to {high:g}; they must hold the start, {start:g}")
@@ -53,10 +53,9 @@ def _invert(
     now = _tried(address, p, s, x, w, start)
     u = start
     for k in range(wanted.size):
-        near, far = u, high if wanted[k] > now else low
-        for _ in range(_HALVINGS):
-            if wanted[k] == now:
-                break
+        near = u
+        far = high if wanted[k] > now else (low if wanted[k] < now else u)
+        for _ in range(_HALVINGS if far != near else 0):
             middle = 0.5 * (near + far)
             trial_s[:] = s
             trial_x[:] = x

@@ -44,9 +44,7 @@ class Shape(Section):
 class Identify(Section):
     """The section ``identify``: the model and how it learns."""
 
-    model: str = Field(
-        "interval", description="basis: interval, shaped-interval, stop, extended-stop, preisach"
-    )
+    model: str = Field("interval", description=MODELS)
     intervals: int = Field(20, ge=1, le=100_000, description="number of elements")
     range: Positive | None = Field(None, description="m, from full saturation to full saturation")
     spacing: float = Field(1.0, ge=1e-3, le=1e3, description="last width over first")
