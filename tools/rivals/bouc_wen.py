@@ -47,7 +47,7 @@ class BoucWen:
     def _columns(self, shape: Floats, u: Floats, before: Floats) -> Floats:
         v = np.concatenate([[0.0], before, u]) / self.scale
         out = np.empty_like(v)
-        state(v, *(float(a) for a in shape), out)
+        state(v, float(shape[0]), float(shape[1]), float(shape[2]), out)
         return np.column_stack([out, v, np.ones_like(v)])[1 + before.size :]
 
     def fit(self, motions: Sequence[Motion], ridge: float) -> None:
