@@ -22,7 +22,8 @@ congruent; output makes them non-congruent, as Kuhnen's dead zones do.
 `skew` differs in kind: displacements count (1 + skew) times forward and (1 - skew) times backward before
 they reach the operator, which is then stiffer in one direction, up to the same level. A small loop does not
 close then: it ratchets towards the stiffer side until everything slides there, which bounds it, and closes
-from then on. It is 0 unless asked for.
+from then on. It is 0 unless asked for. Motion back and forth within `grain`, the noise of the position, has
+no direction: it would ratchet without end.
 """
 
 from __future__ import annotations
@@ -40,11 +41,11 @@ from rtcomp.kernels import Floats, basis_kernel, compiled
 PARTS = ("reversible", "position", "output")
 PLACES, GROUPS = 5, 4
 """Points of the range at which weights may differ, and groups of intervals whose weights do, unless told."""
-SKEW, SPACING, UNIT, REVERSIBLE, CELLS, OUTPUT, TABLE = range(7)
-"""Places in the parameters, after N and the widths: skew (1); distance of two points (m); a / 2 (m); number
-of reversible regressors, and of cells; whether output is on. From here on point (m) and gain (1) of each
-reversible regressor; first interval, interval after the last, point (m) and gain (1) of each cell; the shape
-c_i (1/m) of the output."""
+SKEW, GRAIN, SPACING, UNIT, REVERSIBLE, CELLS, OUTPUT, TABLE = range(8)
+"""Places in the parameters, after N and the widths: skew (1); grain (m); distance of two points (m); a / 2
+(m); number of reversible regressors, and of cells; whether output is on. From here on point (m) and gain (1)
+of each reversible regressor; first interval, interval after the last, point (m) and gain (1) of each cell;
+the shape c_i (1/m) of the output."""
 _FALL = 3.0
 """Over the range the shape of the output falls by exp(-3), unless told."""
 _WORTH = 0.1
@@ -63,7 +64,8 @@ def integral(q: float, point: float, spacing: float) -> float:
 
 @basis_kernel
 def shaped_interval_operator(p: Floats, s: Floats, x: Floats, u: float) -> None:
-    """p: N, widths (m), then the places above. s: the interval operator's, then the last input (m).
+    """p: N, widths (m), then the places above. s: the interval operator's, the last input (m), the
+    place within the grain (m).
 
     x: xi_i, reversible, cells, output (m). A step costs all intervals and all that is added.
     """
@@ -78,8 +80,11 @@ def shaped_interval_operator(p: Floats, s: Floats, x: Floats, u: float) -> None:
     s[last] = u
     if step == 0.0:
         return
+    inside = s[last + 1] + step
+    s[last + 1] = min(max(inside, -p[at + GRAIN]), p[at + GRAIN])
+    step += p[at + SKEW] * abs(inside - s[last + 1])
     s[INPUT] = 0.0  # the operator sees displacements, so that a skewed one accumulates nothing
-    advance(p, s, x, step * (1.0 + p[at + SKEW]) if step > 0.0 else step * (1.0 - p[at + SKEW]))
+    advance(p, s, x, step)
     z = 0.0
     for i in range(count):
         z += x[i]
@@ -119,9 +124,9 @@ class ShapedIntervalBasis(Basis):
     """Intervals of the given widths (m) with some of the `parts` reversible, position, output.
 
     `places` (odd, 3 to 25) points of the range and `groups` of intervals say how finely position and the
-    reversible part are resolved. `skew` (-0.9 to 0.9) makes it stiffer in one direction. `shape` (N entries,
-    any unit) are weights near the true ones, by which the output that bends itself is known. Raises
-    ConfigError for what is outside these ranges.
+    reversible part are resolved. `skew` (-0.9 to 0.9) makes it stiffer in one direction, for motion beyond
+    `grain` (m). `shape` (N entries, any unit) are weights near the true ones, by which the output that bends
+    itself is known. Raises ConfigError for what is outside these ranges.
     """
 
     name = "shaped-interval"
@@ -138,6 +143,7 @@ class ShapedIntervalBasis(Basis):
         places: int = PLACES,
         groups: int | None = None,
         skew: float = 0.0,
+        grain: float = 0.0,
         shape: Sequence[float] | Floats | None = None,
     ) -> None:
         self.widths = IntervalBasis(widths).widths
@@ -155,7 +161,12 @@ class ShapedIntervalBasis(Basis):
             )
         if not -0.9 <= skew <= 0.9:
             raise ConfigError(f"{self.name} model: skew is {skew:g}; allowed is -0.9 to 0.9", key=("skew",))
-        self.places, self.groups, self.skew = int(places), int(groups), float(skew)
+        if not 0.0 <= grain < float(self.widths.sum()):
+            raise ConfigError(
+                f"{self.name} model: grain is {grain:g} m; allowed is 0 to the range", key=("grain",)
+            )
+        self.places, self.groups = int(places), int(groups)
+        self.skew, self.grain = float(skew), float(grain)
         fall = np.exp(-_FALL * np.cumsum(self.widths) / self.widths.sum())
         self.shape = np.array(fall if shape is None else shape, dtype=np.float64).reshape(-1)
         level = float(self.shape @ self.widths) / 2 if self.shape.size == n else np.nan
@@ -209,7 +220,15 @@ class ShapedIntervalBasis(Basis):
         counts = [len(self._points), len(self._cells), "output" in self.parts]
         return np.concatenate(
             [
-                [self.widths.size, *self.widths, self.skew, self.spacing, self.widths.mean() / 2, *counts],
+                [
+                    self.widths.size,
+                    *self.widths,
+                    self.skew,
+                    self.grain,
+                    self.spacing,
+                    self.widths.mean() / 2,
+                    *counts,
+                ],
                 np.ravel(self._points),
                 np.ravel(self._cells),
                 self.shape / (self.shape @ self.widths / 2),
@@ -218,7 +237,7 @@ class ShapedIntervalBasis(Basis):
 
     def initial_state(self) -> Floats:
         """Return the anhysteretic state (5): every interval half activated."""
-        return np.concatenate([np.zeros(AMOUNTS), self.widths / 2, [0.0]])
+        return np.concatenate([np.zeros(AMOUNTS), self.widths / 2, [0.0, 0.0]])
 
     def scales(self) -> Floats:
         """Return half the widths, and half the mean width for each that the parts add (m)."""
@@ -233,13 +252,14 @@ class ShapedIntervalBasis(Basis):
             "places": self.places,
             "groups": self.groups,
             "skew": self.skew,
+            "grain": self.grain,
         }
         return {**entry, "shape": [float(c) for c in self.shape]} if "output" in self.parts else entry
 
     @classmethod
     def from_dict(cls, entry: Mapping[str, Any]) -> ShapedIntervalBasis:
         """Build from ``{widths: [...], parts: [...], ...}``; all but the widths may be left out."""
-        checked_keys(entry, cls.name, ["widths"], ["parts", "places", "groups", "skew", "shape"])
+        checked_keys(entry, cls.name, ["widths"], ["parts", "places", "groups", "skew", "grain", "shape"])
         return cls(**entry)
 
 

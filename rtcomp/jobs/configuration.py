@@ -39,6 +39,7 @@ class Shape(Section):
     places: int = Field(5, ge=3, le=25, description="points of the range where weights may differ, odd")
     groups: int | None = Field(None, ge=1, description="of intervals whose weights differ alike; 4")
     skew: float = Field(0.0, ge=-0.9, le=0.9, description="how much stiffer forward; ratchets, see the docs")
+    grain: float = Field(0.0, ge=0, description="m, motion back and forth that a skew does not count")
 
 
 class Identify(Section):

@@ -74,8 +74,10 @@ class Identified:
 
 
 def friction_level(model: HysteresisModel) -> float:
-    """Return the force (N) of the model with every element saturated."""
-    return float(np.sum(np.abs(model.weights) * model.basis.scales()))
+    """Return the force (N) of the model with every element saturated, what gives it shape left out."""
+    basis = model.basis
+    n = basis.widths.size if isinstance(basis, ShapedIntervalBasis) else basis.size
+    return float(np.sum(np.abs(model.weights[:n]) * basis.scales()[:n]))
 
 
 def identify(
@@ -224,16 +226,13 @@ def never_reached(model: HysteresisModel) -> list[str]:
     """Say which elements the motion never exercised."""
     if model.reached is None or bool((model.reached > 0).all()):
         return []
-    missing = np.flatnonzero(model.reached == 0) + 1
+    missing, size = np.flatnonzero(model.reached == 0) + 1, model.basis.size
+    which = f"elements {missing[0]} to {missing[-1]} of {size} were never reached; their weights"
+    if missing[-1] - missing[0] >= missing.size:
+        which = f"{missing.size} of {size} elements, {missing[0]} first, were never reached; their weights"
     if model.weights[missing - 1].any():
-        return [
-            f"elements {missing[0]} to {missing[-1]} of {model.basis.size} were never reached; their weights "
-            "go on as those before them fall"
-        ]
-    return [
-        f"elements {missing[0]} to {missing[-1]} of {model.basis.size} were never reached; "
-        "their weights are 0: move further, or make identify.range smaller"
-    ]
+        return [f"{which} go on as those before them fall, where they are intervals"]
+    return [f"{which} are 0: move further, or make identify.range smaller"]
 
 
 def _from_recording(

@@ -21,6 +21,7 @@ from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.hysteresis.shaped import ShapedIntervalBasis
 from rtcomp.jobs.configuration import AUTO, Configuration
 from rtcomp.jobs.judge import Friction, reached
+from rtcomp.jobs.tick_settings import NOISE_COUNTS
 from rtcomp.kernels import Floats, call_learner, compiled
 
 LADDER: tuple[tuple[str, ...], ...] = (
@@ -49,6 +50,8 @@ class Motion:
     force: Floats
     good: npt.NDArray[np.bool_]
     gate: float = 0.0
+    grain: float = 0.0
+    """m, the noise of the position: what a skew must not take for motion."""
 
 
 @dataclass(frozen=True)
@@ -167,7 +170,9 @@ def that_pays(
         return model, []
     rows = friction.time <= window[1]
     good = friction.good & (friction.time >= window[0])
-    motion = Motion(friction.position[rows], friction.force[rows], good[rows], config.identify.gate)
+    sensor = config.stage.sensor
+    grain = sensor.resolution + NOISE_COUNTS * sensor.noise
+    motion = Motion(friction.position[rows], friction.force[rows], good[rows], config.identify.gate, grain)
     choice = choose(plain, config.learner(), motion)
     if isinstance(choice.model.basis, IntervalBasis):
         return model, choice.notes
@@ -208,13 +213,14 @@ def _fitted(
     if not parts and not skew:
         plain = IntervalBasis(widths)
         return plain, learned(plain, learner, with_offset(plain, motion.position), motion.force, rows)
-    basis = ShapedIntervalBasis(widths, parts, skew=skew)
+    grain = motion.grain if skew else 0.0
+    basis = ShapedIntervalBasis(widths, parts, skew=skew, grain=grain)
     w = learned(basis, learner, with_offset(basis, motion.position), motion.force, rows)
     for _ in range(_ROUNDS if "output" in parts else 0):
         slopes = w[: widths.size]
         if not float(slopes @ widths) > 0.0:
             break
-        basis = ShapedIntervalBasis(widths, parts, skew=skew, shape=slopes)
+        basis = ShapedIntervalBasis(widths, parts, skew=skew, grain=grain, shape=slopes)
         w = learned(basis, learner, with_offset(basis, motion.position), motion.force, rows)
     return basis, w
 

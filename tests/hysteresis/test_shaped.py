@@ -89,6 +89,21 @@ def test_a_skew_is_displacement_that_counts_more_in_one_direction():
     assert np.allclose(regressors(skewed, u), regressors(IntervalBasis.over(6, 2.0), warped), atol=1e-12)
 
 
+def test_noise_within_the_grain_does_not_ratchet():
+    """A skewed operator that moves slowly in noise goes as without it."""
+    rng = np.random.default_rng(5)
+    t = np.linspace(0.0, 1.0, 20_000)
+    clean = 0.7 * t * np.sin(2 * np.pi * 3 * t)
+    noisy = clean + 0.002 * rng.uniform(-1.0, 1.0, t.size)
+    noisy[0] = clean[0]
+    ends = []
+    for grain in (0.0, 0.004):
+        basis = ShapedIntervalBasis.over(6, 2.0, parts=[], skew=0.1, grain=grain)
+        apart = np.abs(regressors(basis, noisy)[:, 1:] - regressors(basis, clean)[:, 1:]).max()
+        ends.append(apart)
+    assert ends[1] < 0.02 < 0.1 < ends[0]
+
+
 @settings(max_examples=40, deadline=None)
 @given(inputs)
 def test_the_reversible_part_is_a_function_of_the_deflection(u):
@@ -165,6 +180,8 @@ def test_it_fits_a_preisach_plane_that_the_symmetric_operator_cannot():
         ({"groups": 9}, "1 to the 3 intervals"),
         ({"groups": 0}, "whole number"),
         ({"skew": 1.0}, "allowed is -0.9 to 0.9"),
+        ({"grain": -1e-9}, "grain is -1e-09 m"),
+        ({"grain": 3.0}, "0 to the range"),
         ({"shape": [1.0]}, "3 finite numbers"),
         ({"shape": [-1.0, -1.0, -1.0]}, "above 0"),
         ({"widths": []}, "empty"),

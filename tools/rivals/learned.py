@@ -66,7 +66,7 @@ class Learned:
                 break
             slopes = self.weights[: b.widths.size]
             if float(slopes @ b.widths) > 0.0:
-                self.basis = ShapedIntervalBasis(b.widths, b.parts, b.places, b.groups, b.skew, slopes)
+                self.basis = ShapedIntervalBasis(b.widths, b.parts, b.places, b.groups, shape=slopes)
                 self._learn(motions)
 
     def predict(self, u: Floats, before: Floats) -> Floats:
