@@ -273,13 +273,9 @@ def noisy() -> list[Figure]:
     base = Configuration.load(shipped("leuven.yaml"))
     flawed = base.changed(stage={**base.file.data["stage"], "effects": FLAWS}).stage
     found = {}
-    for name, model, config in (
-        ("ideal", "interval", base),
-        ("symmetric", "interval", base),
-        ("auto", "auto", base),
-    ):
-        with_model = config.changed(identify={**base.file.data["identify"], "model": model})
-        done = identify(with_model.simulating(flawed) if name != "ideal" else with_model)
+    for name, model in (("ideal", "interval"), ("symmetric", "interval"), ("auto", "auto")):
+        config = base.changed(identify={**base.file.data["identify"], "model": model})
+        done = identify(config if name == "ideal" else config.simulating(flawed))
         assert done.held_out is not None
         found[name] = 100.0 * done.held_out.relative
     ideal = f"symmetric: {found['symmetric']:.3g} %; ideal rig: {found['ideal']:.3g} %"
