@@ -29,14 +29,19 @@ def main(recording: Path | None, path: Path | None) -> None:
     section = config.run.recording
     data = read(recording, section.map)
     part = identify(config, data)
+    further = identify(config.changed(identify={**config.file.data["identify"], "beyond": "continue"}), data)
     whole = identify(config.changed(identify={**config.file.data["identify"], "learn": ALL}), data)
     measured = read(recording, {**section.map, "voltage": "effort_measured_Nm"})
     effort = identify(config.changed(identify={**config.file.data["identify"], "learn": ALL}), measured)
-    assert part.held_out is not None
+    assert part.held_out is not None and further.held_out is not None
     figures = [
         Figure("learned to 0.25 N m, in sample", 1e3 * part.in_sample.rms, "mN m", "<= 24.5"),
         Figure("learned to 0.25 N m, judged on 0.30", 1e3 * part.held_out.rms, "mN m", "", "frozen weights"),
         Figure("... relative to the peak", 100 * part.held_out.relative, "%"),
+        Figure(
+            "... weights going on beyond the reach", 1e3 * further.held_out.rms, "mN m", "",
+            "identify.beyond: continue",
+        ),
         Figure(
             "learned to 0.30 N m, in sample", 1e3 * whole.in_sample.rms, "mN m", "<= 24.5",
             "a plain off-line Maxwell-slip fit: 24.5",

@@ -16,6 +16,7 @@ from rtcomp.errors import ConfigError, LimitError
 from rtcomp.hysteresis import Basis, Learner, basis_named, build_learner
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.self_placing import SelfPlacingBasis
+from rtcomp.hysteresis.shaped import ShapedIntervalBasis
 from rtcomp.jobs.arming import Arming
 from rtcomp.jobs.limit_settings import Limits, Loop, Positive
 from rtcomp.stage.schema import StageFile
@@ -25,10 +26,30 @@ from rtcomp.yamlfile import Section, YamlFile, load_yaml, validate
 Times = Annotated[list[Annotated[float, Field(ge=0)]], Field(min_length=2, max_length=2)]
 
 
+AUTO = "auto"
+"""In the place of a basis: the interval operator, and the shape that pays on motion not learned from."""
+MODELS = (
+    "basis: interval, self-placing, shaped-interval, stop, extended-stop, preisach; or auto, the shape that "
+    "pays"
+)
+
+
+class Shape(Section):
+    """The section ``identify.shape``: what the model shaped-interval adds to the interval operator."""
+
+    parts: list[Literal["reversible", "position", "output"]] = Field(
+        ["reversible", "position", "output"], description="what is added"
+    )
+    places: int = Field(5, ge=3, le=25, description="points of the range where weights may differ, odd")
+    groups: int | None = Field(None, ge=1, description="of intervals whose weights differ alike; 4")
+    skew: float = Field(0.0, ge=-0.9, le=0.9, description="how much stiffer forward; ratchets, see the docs")
+    grain: float = Field(0.0, ge=0, description="m, motion back and forth that a skew does not count")
+
+
 class Identify(Section):
     """The section ``identify``: the model and how it learns."""
 
-    model: str = Field("interval", description="basis: interval, self-placing, stop, extended-stop, preisach")
+    model: str = Field("interval", description=MODELS)
     intervals: int = Field(20, ge=1, le=100_000, description="number of elements")
     range: Positive | None = Field(None, description="m, from full saturation to full saturation")
     spacing: float = Field(1.0, ge=1e-3, le=1e3, description="last width over first")
@@ -43,12 +64,17 @@ class Identify(Section):
     gate: float = Field(0.0, ge=0, description="m of motion between two updates")
     offset: bool = Field(True, description="learn a constant force too")
     prior: Literal["none", "non-increasing"] = Field("none", description="what is known of the virgin curve")
+    beyond: Literal["zero", "continue"] = Field(
+        "zero", description="weights of intervals hardly reached: none, or the fall of the known ones goes on"
+    )
     learn: Times | None = Field(None, description="s, when to learn; all of the run if not given")
+    shape: Shape | None = Field(None, description="of the model shaped-interval")
 
     @field_validator("model")
     @classmethod
     def _known_basis(cls, value: str) -> str:
-        basis_named(value)
+        if value != AUTO:
+            basis_named(value)
         return value
 
     @field_validator("learner")
@@ -65,8 +91,13 @@ class Identify(Section):
             says = "range and widths are both given; the widths alone say where the intervals lie"
             raise ConfigError(says, key=("range",))
         for key, given in (("prior", self.prior != "none"), ("widths", self.widths is not None)):
-            if given and self.model not in ("interval", SelfPlacingBasis.name):
+            if given and self.model not in ("interval", SelfPlacingBasis.name, AUTO):
                 raise ConfigError(f"speaks of intervals; model is {self.model!r}", key=(key,))
+        with_continuation = ("interval", SelfPlacingBasis.name, ShapedIntervalBasis.name, AUTO)
+        if self.beyond != "zero" and self.model not in with_continuation:
+            raise ConfigError(f"speaks of intervals; model is {self.model!r}", key=("beyond",))
+        if self.shape is not None and self.model != ShapedIntervalBasis.name:
+            raise ConfigError(f"speaks of the model shaped-interval; model is {self.model!r}", key=("shape",))
         if self.learn is not None:
             _in_order(self.learn, ("learn",))
         return self
@@ -266,7 +297,11 @@ class Configuration:
             return self.moving(IntervalBasis(section.widths))
         assert section.range is not None
         try:
-            return basis_named(section.model).over(section.intervals, section.range, section.spacing)
+            if section.shape is not None:
+                shape = section.shape.model_dump()
+                return ShapedIntervalBasis.over(section.intervals, section.range, section.spacing, **shape)
+            name = IntervalBasis.name if section.model == AUTO else section.model
+            return basis_named(name).over(section.intervals, section.range, section.spacing)
         except ConfigError as error:
             raise self.file.error(("identify", *error.key), str(error)) from error
 

@@ -10,9 +10,12 @@ import numpy as np
 
 from rtcomp.control.references import Reference
 from rtcomp.errors import Interrupted, RecordingError
+from rtcomp.hysteresis.basis import regressors
+from rtcomp.hysteresis.beyond import continued, passes
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.hysteresis.prior import non_increasing
+from rtcomp.hysteresis.shaped import ShapedIntervalBasis
 from rtcomp.jobs.arming import permit
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.judge import Friction, Judgement, friction_of, judge, learning_curve, reached
@@ -20,6 +23,7 @@ from rtcomp.jobs.lead import NOTHING, lead_volts
 from rtcomp.jobs.motion_notes import motion_notes
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
 from rtcomp.jobs.session import Run, Watch, check, make_device, make_tick, run_loop, stopped
+from rtcomp.jobs.shapes import that_pays
 from rtcomp.kernels import Floats
 from rtcomp.loop.device import Armable, Device
 from rtcomp.loop.tick import Tick
@@ -72,8 +76,10 @@ class Identified:
 
 
 def friction_level(model: HysteresisModel) -> float:
-    """Return the force (N) of the model with every element saturated."""
-    return float(np.sum(np.abs(model.weights) * model.basis.scales()))
+    """Return the force (N) of the model with every element saturated, what gives it shape left out."""
+    basis = model.basis
+    n = basis.widths.size if isinstance(basis, ShapedIntervalBasis) else basis.size
+    return float(np.sum(np.abs(model.weights[:n]) * basis.scales()[:n]))
 
 
 def identify(
@@ -96,12 +102,13 @@ def identify(
     )
     model = model_of(config, learned.tick, learned_positions(config, learned))
     own = friction(config, learned)
+    model, shape_notes = that_pays(config, model, own, learning_window(config))
     settle = config.run.judge.settle
     # A run stopped early is judged all the same: on its second half at least.
     settle = min(settle, 0.5 * float(learned.columns["time"][-1]))
     in_sample = judge(model, own, settle=settle)
     held_out, on, number = None, own, None
-    notes = [*learned.remarks, *motion_notes(model, learned_positions(config, learned))]
+    notes = [*learned.remarks, *motion_notes(model, learned_positions(config, learned)), *shape_notes]
     unjudged = "the model was not judged on other motion"
     if learned.outcome.stopped_by == "signal":
         number = learned.signal
@@ -113,7 +120,7 @@ def identify(
         except Interrupted as error:  # what has been learned is not thrown away
             number = error.number
             notes.append(f"judging {error}; {unjudged}")
-    curve = learning_curve(model.basis, learned.weights, learned.tick.offset_scale, on, settle=settle)
+    curve = learning_curve(learned.tick.basis, learned.weights, learned.tick.offset_scale, on, settle=settle)
     return Identified(config, model, learned, in_sample, held_out, learned.weights_time, curve, notes, number)
 
 
@@ -209,6 +216,11 @@ def model_of(config: Configuration, tick: Tick, positions: Floats) -> Hysteresis
         weights = non_increasing(weights, information, free=1)
     part = reached(basis, positions)
     weights[:-1][part == 0.0] = 0.0
+    if config.identify.beyond == "continue" and isinstance(basis, IntervalBasis | ShapedIntervalBasis):
+        n, cut = basis.widths.size, config.identify.smoothing
+        slow = zero_phase(positions, cut, 1.0 / config.period) if cut > 0.0 else positions
+        passed = passes(regressors(basis, slow)[:, :n], basis.widths)
+        weights[:n] = continued(weights[:n], basis.widths, passed)[0]
     return HysteresisModel(basis, weights[:-1], weights[-1] * tick.offset_scale, part)
 
 
@@ -250,6 +262,7 @@ def _from_recording(
         smoothing,
         ~recording.trusted,
     )
+    model, shape_notes = that_pays(config, model, own, learning_window(config))
     window = config.run.judge.window
     settle = config.run.judge.settle
     first = config.identify.learn[0] if config.identify.learn is not None else 0.0
@@ -257,13 +270,13 @@ def _from_recording(
     in_sample = judge(model, own, (first, last), settle)
     held_out = judge(model, own, (window[0], window[1]), 0.0) if window is not None else None
     curve = learning_curve(
-        model.basis,
+        learned.tick.basis,
         learned.weights,
         learned.tick.offset_scale,
         own,
         (window[0], window[1]) if window is not None else (first, last),
     )
-    notes = [*recording.notes, *motion_notes(model, recording.position[time <= learn_end])]
+    notes = [*recording.notes, *motion_notes(model, recording.position[time <= learn_end]), *shape_notes]
     return Identified(config, model, learned, in_sample, held_out, learned.weights_time, curve, notes)
 
 

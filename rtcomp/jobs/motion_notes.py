@@ -20,20 +20,28 @@ def motion_notes(model: HysteresisModel, position: Floats) -> list[str]:
             *too_far(model.basis, position)]  # fmt: skip
 
 
+def range_of(basis: Basis) -> float:
+    """Return the motion (m) from full saturation to full saturation."""
+    widths = getattr(basis, "widths", None)
+    return float(widths.sum() if widths is not None else 2.0 * basis.scales().sum())
+
+
 def never_reached(model: HysteresisModel) -> list[str]:
     """Say which elements the motion never exercised."""
     if model.reached is None or bool((model.reached > 0).all()):
         return []
-    missing = np.flatnonzero(model.reached == 0) + 1
-    return [
-        f"elements {missing[0]} to {missing[-1]} of {model.basis.size} were never reached; "
-        "their weights are 0: move further, or make identify.range smaller"
-    ]
+    missing, size = np.flatnonzero(model.reached == 0) + 1, model.basis.size
+    which = f"elements {missing[0]} to {missing[-1]} of {size} were never reached; their weights"
+    if missing[-1] - missing[0] >= missing.size:
+        which = f"{missing.size} of {size} elements, {missing[0]} first, were never reached; their weights"
+    if model.weights[missing - 1].any():
+        return [f"{which} go on as those before them fall, where they are intervals"]
+    return [f"{which} are 0: move further, or make identify.range smaller"]
 
 
 def one_way(basis: Basis, position: Floats) -> list[str]:
     """Say that the motion never turned back: one branch is all that the model rests on."""
-    back = TURNED * min(float(np.ptp(position)), 2.0 * float(basis.scales().sum()))
+    back = TURNED * min(float(np.ptp(position)), range_of(basis))
     down = float(np.max(np.maximum.accumulate(position) - position))
     up = float(np.max(position - np.minimum.accumulate(position)))
     if min(down, up) > back:
@@ -57,7 +65,7 @@ def too_fine(basis: Basis, position: Floats) -> list[str]:
 
 def too_far(basis: Basis, position: Floats) -> list[str]:
     """Say that the motion is so much larger than the range that hardly any of it is presliding."""
-    span, total = float(np.ptp(position)), 2.0 * float(basis.scales().sum())
+    span, total = float(np.ptp(position)), range_of(basis)
     if not span > FAR * total:
         return []
     return [

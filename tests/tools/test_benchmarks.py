@@ -185,3 +185,26 @@ def test_the_serial_link(tmp_path: Path) -> None:
         assert found["runs with every tick in the recording"]["value"] == 4.0
         return
     pytest.skip("this machine had no quiet quarter of a minute for a link in real time")
+
+
+@pytest.mark.slow
+def test_shapes_and_rivals(tmp_path: Path) -> None:
+    """On loops made up with a Preisach plane, in the file's form, and the simulated rig."""
+    from scipy.io import savemat
+
+    from rtcomp.hysteresis.basis import regressors
+    from rtcomp.hysteresis.preisach import PreisachBasis
+
+    plane = PreisachBasis(7, 2000.0)
+    rows, columns = np.tril_indices(7)
+    density = 0.05 + 0.02 * rows + 0.01 * columns * (rows > 3)
+    record = {}
+    for name, volts in (("08", 800), ("1", 1000), ("11", 1100), ("15", 1500), ("19", 1900)):
+        u = volts * np.interp(np.arange(401), [0, 100, 300, 400], [0.0, 1.0, -1.0, 0.0])
+        moved = (regressors(plane, np.concatenate([[0.0], u, u])) @ density)[-401:]
+        record |= {f"Vplus_{name}kv": u, f"Displacement_{name}kv": moved - moved[0]}
+    (tmp_path / "piezo").mkdir()
+    savemat(tmp_path / "piezo" / "MeasurementData.mat", record)
+    found = figures(tmp_path, "bench_shapes.py", tmp_path, "--quick")
+    assert found["piezo, with shape"]["met"] and found["failing rig, three cycles"]["met"]
+    assert found["kernels a tick, 20 intervals, everything on"]["value"] < 10.0
