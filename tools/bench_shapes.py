@@ -32,6 +32,7 @@ from rivals.bouc_wen import BoucWen
 from rivals.generalised_pi import GeneralisedPi
 from rivals.learned import Learned
 from rivals.modified_pi import ModifiedPi
+from rivals.recurrent import Recurrent
 
 from rtcomp.bench.tick import tick_times
 from rtcomp.hysteresis.basis import regressors
@@ -85,6 +86,7 @@ def rivals() -> list[Rival]:
         ModifiedPi(),
         GeneralisedPi(),
         BoucWen(),
+        Recurrent(),
     ]
 
 
