@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 import struct
 
 import numpy as np
@@ -213,6 +214,37 @@ def test_the_output_is_zero_unless_enabled_whatever_comes(frames):
         assert host.axis.state is State.ENABLED or host.axis.output == 0.0
     assert math.isfinite(host.axis.plant.position)
     assert host.axis.time == pytest.approx(host.now)
+
+
+@pytest.mark.slow
+def test_ten_million_frames_of_anything():
+    """Any identifier, any data, many at a time: no crash, and no output that nobody may have asked for."""
+    noise = random.Random(5)
+    host = Host(voltage_limit=5.0)
+    axis = host.axis
+    own = (0x000, 0x080, 0x200 + NODE, 0x600 + NODE, 0x600 + NODE, 0x700 + HOST)
+    enabled = zeroed = 0
+    for _ in range(100_000):
+        batch = [
+            Frame(
+                noise.choice(own) if noise.getrandbits(1) else noise.getrandbits(11),
+                noise.randbytes(noise.choice((0, 1, 2, 4, 8, 8, 8))),
+                not noise.getrandbits(3),
+            )
+            for _ in range(100)
+        ]
+        was = axis.state is State.ENABLED
+        host.now += noise.random() * 1e-3
+        axis.receive(batch, host.now)
+        zeroed += was and axis.state is not State.ENABLED
+        if noise.random() < 0.05:
+            axis.receive([RESET], host.now)
+            host.heard = []
+            host.enable()
+            enabled += 1
+        assert axis.state is State.ENABLED or axis.output == 0.0
+        assert abs(axis.output) <= 5.0
+    assert enabled > 1000 and zeroed > 1000
 
 
 def test_a_fault_is_latched_until_a_rising_edge():
