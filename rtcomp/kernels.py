@@ -85,7 +85,7 @@ def learner_kernel(function: Callable[..., None]) -> Kernel:
 
 
 def placing_kernel(function: Callable[..., None]) -> Kernel:
-    """Make a kernel that moves a basis's elements while it runs (`hysteresis.placing.place`)."""
+    """Make a kernel that moves a basis's elements while it runs (`hysteresis.moving.placing.place`)."""
     return Kernel(function, _PLACING, 10)
 
 

@@ -20,8 +20,8 @@ from rtcomp.cli.runs import load
 from rtcomp.hysteresis import Basis, regressors
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.learner import learn, learn_places
+from rtcomp.hysteresis.moving.self_placing import SelfPlacingBasis
 from rtcomp.hysteresis.rls import Rls
-from rtcomp.hysteresis.self_placing import SelfPlacingBasis
 from rtcomp.jobs.demo import shipped
 from rtcomp.kernels import Floats
 

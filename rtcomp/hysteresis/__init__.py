@@ -7,12 +7,12 @@ from rtcomp.hysteresis import (
     lms,
     preisach,
     rls,
-    self_placing,
     shaped,
     stop,
 )
 from rtcomp.hysteresis.basis import Basis, bases, basis_named, regressors
 from rtcomp.hysteresis.learner import Learner, build_learner, learn, learners
+from rtcomp.hysteresis.moving import self_placing
 
 __all__ = [
     "Basis", "Learner", "bases", "basis_named", "build_learner", "extended_stop", "gradient", "interval",

@@ -27,7 +27,7 @@ class Basis:
     """
     source: ClassVar[str]
     placing: ClassVar[Kernel | None] = None
-    """What moves the elements while learning runs (`hysteresis.placing`); None where they stay."""
+    """What moves the elements while learning runs (`hysteresis.moving`); None where they stay."""
 
     @property
     def size(self) -> int:

@@ -15,7 +15,7 @@ import numpy as np
 
 from rtcomp.errors import ConfigError, nearest
 from rtcomp.hysteresis.basis import Basis
-from rtcomp.hysteresis.places import CHANGE_WIDTH, CHANGED
+from rtcomp.hysteresis.moving.places import CHANGE_WIDTH, CHANGED
 from rtcomp.kernels import (
     Floats,
     Kernel,

@@ -8,7 +8,7 @@ import numpy as np
 
 from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.learner import Learner, register_learner
-from rtcomp.hysteresis.places import INTERVALS, MERGED, PART, SHARE, SPLIT
+from rtcomp.hysteresis.moving.places import INTERVALS, MERGED, PART, SHARE, SPLIT
 from rtcomp.kernels import Floats, compiled, learner_kernel, regroup_kernel
 
 NOISE_MEMORY, PEAK_MEMORY = 1000.0, 20_000.0

@@ -15,7 +15,7 @@ from rtcomp.control.references import Reference, build_reference, check
 from rtcomp.errors import ConfigError, LimitError
 from rtcomp.hysteresis import Basis, Learner, basis_named, build_learner
 from rtcomp.hysteresis.interval import IntervalBasis
-from rtcomp.hysteresis.self_placing import SelfPlacingBasis
+from rtcomp.hysteresis.moving.self_placing import SelfPlacingBasis
 from rtcomp.hysteresis.shaped import ShapedIntervalBasis
 from rtcomp.jobs.arming import Arming
 from rtcomp.jobs.limit_settings import Limits, Loop, Positive

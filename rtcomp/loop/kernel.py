@@ -14,7 +14,7 @@ from rtcomp.control.limits import FLAGS, limit_step
 from rtcomp.control.limits import NOT_FINITE as NO_NUMBER
 from rtcomp.control.pid import INTEGRAL, INTEGRAL_LIMIT, KI, LAST_INPUT, ON_MEASUREMENT, pid_step
 from rtcomp.hysteresis.conditioning import settle, smooth
-from rtcomp.hysteresis.places import CHANGED
+from rtcomp.hysteresis.moving.places import CHANGED
 from rtcomp.kernels import Floats, call_basis, call_learner, call_placing, call_regroup, compiled
 from rtcomp.loop import layout as at
 from rtcomp.loop.checks import STALE_STATUS, check, is_new

@@ -16,7 +16,7 @@ import numpy as np
 from rtcomp.hysteresis.basis import Basis
 from rtcomp.hysteresis.conditioning import memory
 from rtcomp.hysteresis.learner import Learner, followed
-from rtcomp.hysteresis.places import CHANGE_WIDTH, MOVES
+from rtcomp.hysteresis.moving.places import CHANGE_WIDTH, MOVES
 from rtcomp.kernels import Floats
 from rtcomp.loop import layout as at
 from rtcomp.loop.kernel import Compensator, Identifier, lost_kernel, tick_kernel

@@ -6,7 +6,7 @@ no interval, so it says where the intervals belong (`placing`) and does not chan
 
 from __future__ import annotations
 
-from rtcomp.hysteresis import places as at
+from rtcomp.hysteresis.moving import places as at
 from rtcomp.kernels import Floats, compiled
 
 MEMORY, NOISE_MEMORY = 400.0, 500.0

@@ -18,7 +18,7 @@ import numpy as np
 from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.basis import Basis, checked_keys, register_basis
 from rtcomp.hysteresis.interval import IntervalBasis
-from rtcomp.hysteresis.places import (
+from rtcomp.hysteresis.moving.places import (
     AMOUNTS,
     BEGUN,
     CELLS,
@@ -33,7 +33,7 @@ from rtcomp.hysteresis.places import (
     PATH,
     STARTED,
 )  # fmt: skip
-from rtcomp.hysteresis.placing import place, room
+from rtcomp.hysteresis.moving.placing import place, room
 from rtcomp.kernels import Floats, basis_kernel
 
 MOST_INTERVALS = 1000

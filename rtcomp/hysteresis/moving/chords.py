@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rtcomp.hysteresis import places as at
+from rtcomp.hysteresis.moving import places as at
 from rtcomp.kernels import Floats, compiled
 
 POINTS = 48

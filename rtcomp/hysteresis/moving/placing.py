@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rtcomp.hysteresis import places as at
-from rtcomp.hysteresis.branch_slopes import NOISE_MEMORY, slopes
-from rtcomp.hysteresis.chords import best_split, chord, of_noise
+from rtcomp.hysteresis.moving import places as at
+from rtcomp.hysteresis.moving.branch_slopes import NOISE_MEMORY, slopes
+from rtcomp.hysteresis.moving.chords import best_split, chord, of_noise
 from rtcomp.kernels import Floats, compiled, placing_kernel
 
 START_EACH = 10.0

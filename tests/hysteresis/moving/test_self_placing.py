@@ -15,10 +15,10 @@ from rtcomp.hysteresis.gradient import Gradient
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.learner import Learner, followed, learn, learn_places
 from rtcomp.hysteresis.lms import Lms, Nlms
-from rtcomp.hysteresis.places import CHANGE_WIDTH, CHANGED, INTERVALS, MERGED, PART, SHARE, SPLIT
-from rtcomp.hysteresis.placing import place
+from rtcomp.hysteresis.moving.places import CHANGE_WIDTH, CHANGED, INTERVALS, MERGED, PART, SHARE, SPLIT
+from rtcomp.hysteresis.moving.placing import place
+from rtcomp.hysteresis.moving.self_placing import MOST_INTERVALS, SelfPlacingBasis, cells_of, widths_now
 from rtcomp.hysteresis.rls import Rls
-from rtcomp.hysteresis.self_placing import MOST_INTERVALS, SelfPlacingBasis, cells_of, widths_now
 
 widths_ = st.lists(st.floats(0.01, 1.0), min_size=1, max_size=9).map(np.array)
 moves = st.lists(st.one_of(st.floats(-3.0, 3.0), st.floats(-0.2, 0.2), st.just(0.0)), min_size=1, max_size=50)
