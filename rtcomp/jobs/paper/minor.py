@@ -9,7 +9,7 @@ import numpy as np
 
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.jobs.paper.claim import Claim, Spread, ratio
-from rtcomp.jobs.paper.identification import Effort
+from rtcomp.jobs.paper.identification import NOTICEABLE, Effort
 from rtcomp.jobs.paper.rig import (
     ASYMMETRY,
     CYCLE,
@@ -107,6 +107,7 @@ def minor_claims(
     def spread(values: Sequence[float]) -> Spread:
         return Spread.of(values)
 
+    large = spread([ratio(t.main_on_minor, t.main_on_main) for t in done])
     minor = spread([ratio(t.main_on_minor, t.both_on_minor) for t in done])
     major = spread([ratio(t.both_on_main, t.main_on_main) for t in done])
     mean = spread(
@@ -127,8 +128,15 @@ def minor_claims(
     return [
         Claim(
             f"main-only-spoils-minor{suffix}", "trained on the main loop only, the error on minor loops is large",
-            minor.median > 1.25, minor, "error on minor loops, main only over both", "times",
+            large.median > NOTICEABLE, large, "main only, error on minor loops over that on the main loop", "times",
             "median above 1.25", where, says, errors,
+        ),
+        Claim(
+            f"both-mend-minor{suffix}", "trained on minor loops too, these get better",
+            minor.median > NOTICEABLE, minor, "error on minor loops, main only over both", "times",
+            "median above 1.25", where,
+            "" if minor.median > NOTICEABLE or minor.median <= 1.0 else "They get better, by less than a quarter.",
+            errors,
         ),
         Claim(
             f"both-spoil-main-a-little{suffix}", "trained on minor loops too, the main loop gets a little worse",

@@ -1,0 +1,257 @@
+"""Figures 9a to 15 of the paper, remade: the curves of each, and its key numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rtcomp.jobs.compensate import Compensated
+from rtcomp.jobs.paper.closed_loop import FLAWED, followed, papers_model
+from rtcomp.jobs.paper.identification import NOISE, case
+from rtcomp.jobs.paper.measured import Measured, measured_lessons, turning_points
+from rtcomp.jobs.paper.minor import TAUGHT, Lessons, lessons_of
+from rtcomp.jobs.paper.rig import ASYMMETRY, CYCLE, SOFTENING, rig
+from rtcomp.jobs.paper.training import LEVEL, Exam, Lesson, model_of, train
+from rtcomp.kernels import Floats
+
+SHOWN_S = (3.0, 5.5)
+"""Part of a run in closed loop that is drawn."""
+STAND_IN = (
+    f"simulated stage with asymmetry {ASYMMETRY:g} and softening {SOFTENING:g}, in the place of the real setup"
+)
+
+
+class Trace(NamedTuple):
+    """One curve: its name, x and y of one length, and its role in the figure."""
+
+    name: str
+    x: Floats
+    y: Floats
+    role: str = ""
+
+
+@dataclass(frozen=True)
+class Remade:
+    """One figure of the paper made anew."""
+
+    number: str
+    title: str
+    paper: str
+    """What the paper reports."""
+    here: str
+    """What came out."""
+    source: str
+    """Of what stage or recording, and which learner."""
+    traces: Sequence[Trace]
+    x: tuple[str, str] = ("Position", "m")
+    y: tuple[str, str] = ("Force", "N")
+    numbers: dict[str, float] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the figure as paper.json lists it, without its curves."""
+        return {
+            "figure": self.number, "title": self.title, "paper": self.paper, "here": self.here,
+            "source": self.source, "numbers": self.numbers,
+        }  # fmt: skip
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.2g} %"
+
+
+def identified(number: str, title: str, paper: str, lesson: Lesson, exam: Exam, step: float, source: str,
+               cycles: int = 60) -> Remade:  # fmt: skip
+    """Return a loop and the model trained on it for as many cycles as the paper needed."""
+    done = train(lesson, exam, step, cycles, whole=True)
+    model = model_of(lesson.basis, done.weights)
+    said = model.response(lesson.position)
+    last = slice(-CYCLE, None)
+    driven = lesson.position[last]
+    if lesson.position_noise:
+        chance = np.random.default_rng([lesson.seed, 8])
+        driven = driven + lesson.position_noise * chance.uniform(-1, 1, driven.size)
+    traces = [
+        Trace("measured", driven, lesson.force[last], "measured"),
+        Trace("model", lesson.position[last], said[last], "model"),
+    ]
+    error = float(done.errors[-1])
+    return Remade(
+        number, title, paper, f"After {cycles} cycles the frozen model is off by {_percent(error)} of the peak.",
+        f"{source}; {lesson.basis.size} equal intervals, LMS (8) with step {step:g}", traces,
+        numbers={"error": error, "cycles": float(cycles)},
+    )  # fmt: skip
+
+
+def mirrored(position: Floats, force: Floats) -> tuple[Floats, Floats, float]:
+    """Return a closed loop turned half round about its middle, and how far the two lie apart at most.
+
+    position, force: one cycle, (K,). The distance (1) is over half the height, along branches of equal direction.
+    """
+    middle = 0.5 * (position.max() + position.min()), 0.5 * (force.max() + force.min())
+    x, y = 2 * middle[0] - position, 2 * middle[1] - force
+    grid = np.linspace(position.min(), position.max(), 401)[20:-20]
+
+    def rising(u: Floats, f: Floats) -> Floats:
+        low, high = int(np.argmin(u)), int(np.argmax(u))
+        order = np.arange(low, high + (0 if high > low else u.size)) % u.size
+        along = np.maximum.accumulate(u[order])
+        return np.interp(grid, along, f[order])
+
+    apart = np.abs(rising(position, force) - rising(x, y)).max()
+    return x, y, float(apart / (0.5 * np.ptp(force)))
+
+
+def branches(position: Floats, force: Floats, least: float) -> list[tuple[Floats, Floats]]:
+    """Return every branch between two reversals of `least` (m) with its turning point in the origin.
+
+    Falling branches are turned over, so that all rise: way (m) and force (N) since the reversal.
+    """
+    found = []
+    turns = turning_points(position, least)
+    for a, b in zip(turns[:-1], turns[1:], strict=True):
+        sign = np.sign(position[b] - position[a])
+        found.append((sign * (position[a : b + 1] - position[a]), sign * (force[a : b + 1] - force[a])))
+    return found
+
+
+def apart(found: Sequence[tuple[Floats, Floats]]) -> float:
+    """Return how far branches lie apart at most, over the height of the highest, where two reach as far (1)."""
+    height = max(float(y.max()) for _, y in found)
+    grid = np.linspace(0.0, max(float(x.max()) for x, _ in found), 200)
+    rows = [
+        np.where(grid <= x.max(), np.interp(grid, np.maximum.accumulate(x), y), np.nan) for x, y in found
+    ]
+    stack = np.array(rows)
+    several = np.sum(np.isfinite(stack), axis=0) >= 2
+    widest = np.nanmax(stack[:, several], axis=0) - np.nanmin(stack[:, several], axis=0)
+    return float(widest.max() / height)
+
+
+def symmetry(position: Floats, force: Floats, source: str) -> Remade:
+    """Return Fig. 11a: one cycle of the main loop, and turned half round."""
+    x, y, far = mirrored(position, force)
+    return Remade(
+        "11a", "Symmetry test", "the measured loop and its mirrored counterpart do not quite overlap (no number)",
+        f"They lie at most {_percent(far)} of half the loop's height apart.", source,
+        [Trace("main loop", position, force, "measured"), Trace("mirrored", x, y, "model")],
+        numbers={"asymmetry": far},
+    )  # fmt: skip
+
+
+def congruency(position: Floats, force: Floats, source: str) -> Remade:
+    """Return Fig. 11b: the branches of main and minor loops, their turning points in the origin."""
+    found = branches(position, force, 0.05 * float(np.ptp(position)))
+    far = apart(found)
+    largest = max(range(len(found)), key=lambda k: found[k][0].max())
+    gap = np.array([np.nan])
+
+    def joined(keep: list[tuple[Floats, Floats]], axis: int) -> Floats:
+        return np.concatenate([part for pair in keep for part in (pair[axis], gap)])
+
+    large = [pair for pair in found if pair[0].max() > 0.9 * found[largest][0].max()]
+    small = [pair for pair in found if pair[0].max() <= 0.9 * found[largest][0].max()]
+    traces = [Trace("main loop", joined(large, 0), joined(large, 1), "measured")]
+    if small:
+        traces.append(Trace("minor loops", joined(small, 0), joined(small, 1), "model"))
+    return Remade(
+        "11b", "Congruency test", "the branches of major and minor loops do not quite coincide (no number)",
+        f"{len(found)} branches; they lie at most {_percent(far)} of the highest apart.", source, traces,
+        ("Way since the reversal", "m"), ("Force since the reversal", "N"), {"incongruency": far},
+    )  # fmt: skip
+
+
+def on_minor(number: str, title: str, paper: str, lessons: Lessons, step: float, both: bool, source: str) -> Remade:
+    """Return Fig. 12a or 12b: minor and main loops, and the model trained on the main one, or on both."""
+    weights = train(lessons.both if both else lessons.main, lessons.on_main, step, TAUGHT, whole=True).weights
+    shown = lessons.both
+    said = model_of(shown.basis, weights).response(shown.position)
+    last = slice(-4 * CYCLE, None)
+    on_main, on_small = lessons.on_main.error(weights), lessons.on_minor.error(weights)
+    return Remade(
+        number, title, paper,
+        f"Frozen, it is off by {_percent(on_small)} on other minor loops and {_percent(on_main)} on the main loop.",
+        f"{source}; LMS (8) with step {step:g}, {TAUGHT} cycles",
+        [Trace("measured", shown.position[last], shown.force[last], "measured"),
+         Trace("model", shown.position[last], said[last], "model")],
+        numbers={"error_main": on_main, "error_minor": on_small},
+    )  # fmt: skip
+
+
+def _tracked(number: str, title: str, paper: str, done: Compensated, compensated: bool, source: str) -> Remade:
+    run = done.with_it if compensated else done.without
+    size = done.error_with if compensated else done.error_without
+    c = run.columns
+    rows = (c["time"] >= SHOWN_S[0]) & (c["time"] <= SHOWN_S[1])
+    return Remade(
+        number, title, paper,
+        f"The tracking error is {1e6 * size.rms:.2g} um rms, {1e6 * size.peak:.2g} um at most.", source,
+        [Trace("desired", c["time"][rows], c["reference"][rows], "reference"),
+         Trace("actual", c["time"][rows], c["position"][rows], "with" if compensated else "without")],
+        ("Time", "s"), ("Position", "m"), {"error_rms_um": 1e6 * size.rms, "error_peak_um": 1e6 * size.peak},
+    )  # fmt: skip
+
+
+def figures(step: float, measured: Measured | None = None) -> list[Remade]:
+    """Return all figures: the real setup's from `measured` where there is one, else from the flawed stage."""
+    plain = case(0.0, 0.0, 0)
+    noisy = replace(plain.lesson, position_noise=NOISE * float(np.ptp(plain.lesson.position)))
+    ideal = "simulated Leuven stage"
+    found = [
+        identified("9a", "Simulation, ideal case", f"converged to {_percent(LEVEL)} in about 60 cycles", plain.lesson,
+                   plain.held_out, step, ideal),
+        identified("9b", "Simulation, with measurement noise", "no noticeable difference with about 5 % of noise",
+                   noisy, plain.held_out, step, f"{ideal}, uniform position noise of 5 %"),
+        *_of_setup(step, measured),
+    ]  # fmt: skip
+    sine: dict[str, float | str] = {"kind": "sine", "amplitude": 6e-5, "frequency": 1.0, "duration": 6.0}
+    small: dict[str, Any] = {
+        "kind": "multisine", "frequencies": [0.5, 2.0], "amplitudes": [2.5e-5, 1.5e-5], "duration": 6.0,
+    }  # fmt: skip
+    learner = f"20 equal intervals, LMS (8) with step {step:g}"
+    a = followed(rig(), papers_model((0.0, 0.0), step, 0), sine)
+    b = followed(rig(*FLAWED), papers_model(FLAWED, step, 0), sine)
+    minor = followed(rig(*FLAWED), papers_model(FLAWED, step, 0), small)
+    none = "without compensation the axis stays behind at every reversal (no number)"
+    flawed = f"{STAND_IN}; {learner}"
+    return [
+        *found,
+        _tracked("13a", "Simulation, without compensation", none, a, False, ideal),
+        _tracked("13b", "Real setup, without compensation", none, b, False, STAND_IN),
+        _tracked("14a", "Simulation, with compensation", "extraordinarily good", a, True, f"{ideal}; {learner}"),
+        _tracked("14b", "Real setup, with compensation, major loop", "visible bumps of about 5 um", b, True, flawed),
+        _tracked("15", "Compensation in minor loops", "bumps as in Fig. 14b (no number)", minor, True, flawed),
+    ]  # fmt: skip
+
+
+def _of_setup(step: float, measured: Measured | None) -> list[Remade]:
+    if measured is None:
+        of = case(*FLAWED, 0)
+        lessons = lessons_of(*FLAWED, 0)
+        source = STAND_IN
+        cycle = of.lesson.position[-CYCLE:], of.lesson.force[-CYCLE:]
+        several = lessons.both.position[CYCLE:], lessons.both.force[CYCLE:]
+        first, judged = of.lesson, of.held_out
+    else:
+        lessons = measured_lessons(measured)
+        source = f"recording {measured.name}"
+        last = measured.main[-1]
+        cycle = measured.part([last])
+        several = measured.friction.position, measured.friction.force
+        first, judged = lessons.main, lessons.on_main
+    found = [
+        identified("10", "Real setup, main loop", "much slower than in the simulation (no number)", first, judged,
+                   step, source),
+        symmetry(*cycle, source),
+        congruency(*several, source),
+        on_minor("12a", "Minor loops, trained on the main loop only", "smooth, with a large error on minor loops",
+                 lessons, step, False, source),
+        on_minor("12b", "Minor loops, trained on minor loops too",
+                 "better on minor loops, a little worse on the main loop", lessons, step, True, source),
+    ]  # fmt: skip
+    if measured is not None and measured.axis == "rotary":
+        rotary = {"m": "rad", "N": "N m"}
+        found = [replace(f, x=(f.x[0], rotary[f.x[1]]), y=(f.y[0], rotary[f.y[1]])) for f in found]
+    return found

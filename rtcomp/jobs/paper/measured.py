@@ -1,0 +1,144 @@
+"""A recording in the place of the paper's real setup: its loops, cut into cycles of 1000 samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from rtcomp.errors import RecordingError
+from rtcomp.hysteresis.interval import IntervalBasis
+from rtcomp.jobs.configuration import Configuration
+from rtcomp.jobs.judge import Friction, friction_of
+from rtcomp.jobs.paper.minor import Lessons
+from rtcomp.jobs.paper.rig import CYCLE, INTERVALS
+from rtcomp.jobs.paper.training import Exam, Lesson, activations, train
+from rtcomp.kernels import Floats
+from rtcomp.recording.reader import Recording
+
+ALIKE = 0.15
+"""Cycles belong together that differ by no more of their travel."""
+LEAST_MAIN, LEAST_MINOR = 4, 2
+TURN = 0.1
+"""Of the whole travel: less is not taken for a reversal."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A recording's friction, cycle after cycle of `CYCLE` samples each, and which are the main loop."""
+
+    friction: Friction
+    main: range
+    minor: list[int]
+    axis: str
+    name: str
+
+    def rows(self, cycles: range | list[int]) -> npt.NDArray[np.int64]:
+        """Return the rows of these cycles."""
+        return np.concatenate([np.arange(k * CYCLE, (k + 1) * CYCLE) for k in cycles])
+
+    def part(self, cycles: range | list[int]) -> tuple[Floats, Floats]:
+        """Return position (m or rad) and force (N or N m) of these cycles, one after the other."""
+        rows = self.rows(cycles)
+        return self.friction.position[rows], self.friction.force[rows]
+
+
+def turning_points(position: Floats, least: float) -> npt.NDArray[np.int64]:
+    """Return the rows where motion turns back by `least` (m) or more, highs and lows in turn."""
+    found: list[int] = []
+    best, way = 0, 0.0
+    for k in range(1, position.size):
+        if way == 0.0:
+            if abs(position[k] - position[0]) > least:
+                way, best = float(np.sign(position[k] - position[0])), k
+        elif way * (position[k] - position[best]) > 0.0:
+            best = k
+        elif way * (position[best] - position[k]) > least:
+            found.append(best)
+            way, best = -way, k
+    return np.array(found, dtype=np.int64)
+
+
+def cut(config: Configuration, recording: Recording) -> Measured:
+    """Cut a recording into cycles from low to low and find its main loop.
+
+    The main loop is the largest that comes at least four times in a row, cycle by cycle alike within 15 %;
+    minor loops are smaller. `config` says the axis and how its friction is had (smoothing included). Raises
+    RecordingError where there is no such loop, or no minor ones.
+    """
+    smoothing = config.run.identify.smoothing if config.run.identify is not None else 0.0
+    shown = friction_of(
+        config.stage, recording.time, recording.position, recording.voltage, config.run.recording.delay_ticks,
+        smoothing, ~recording.trusted,
+    )  # fmt: skip
+    position = shown.position
+    turns = turning_points(position, TURN * float(np.ptp(position)))
+    lows = [int(t) for k, t in enumerate(turns) if position[t] < position[turns[k - 1 if k else 1]]]
+    travel = np.array([np.ptp(position[a : b + 1]) for a, b in zip(lows[:-1], lows[1:], strict=True)])
+    main = _main(travel)
+    if main is None:
+        raise RecordingError(
+            f"{recording.path}: no loop comes {LEAST_MAIN} times in a row within {100 * ALIKE:g} % of its travel "
+            f"({travel.size} cycles were found); record the main loop at least {LEAST_MAIN} times"
+        )
+    size = float(np.median(travel[main.start : main.stop]))
+    minor = [k for k, t in enumerate(travel) if t < (1.0 - 2.0 * ALIKE) * size]
+    if len(minor) < LEAST_MINOR:
+        raise RecordingError(
+            f"{recording.path}: {len(minor)} loops are clearly smaller than the main one; at least {LEAST_MINOR} are "
+            "needed: record minor loops too"
+        )
+    rows = np.concatenate(
+        [np.linspace(a, b, CYCLE, endpoint=False) for a, b in zip(lows[:-1], lows[1:], strict=True)]
+    )
+    count = np.arange(position.size, dtype=np.float64)
+    even = Friction(
+        np.interp(rows, count, shown.time), np.interp(rows, count, position), np.interp(rows, count, shown.force),
+        np.interp(rows, count, shown.good.astype(np.float64)) > 0.5,
+    )  # fmt: skip
+    return Measured(even, main, minor, config.stage.axis, recording.path.name)
+
+
+def _main(travel: Floats) -> range | None:
+    best: range | None = None
+    for first in range(travel.size):
+        last = first + 1
+        while last < travel.size and abs(travel[last] - travel[first]) <= ALIKE * travel[first]:
+            last += 1
+        if last - first >= LEAST_MAIN and (best is None or travel[first] > 1.1 * travel[best.start]):
+            best = range(first, last)
+    return best
+
+
+def measured_lessons(of: Measured) -> Lessons:
+    """Return the lessons of a recording: every other cycle of either kind is learned from, the others judged."""
+    position = of.friction.position
+    size = float(np.median([np.ptp(of.part([k])[0]) for k in of.main]))
+    basis = IntervalBasis.over(INTERVALS, size)
+    half = of.main[: len(of.main) // 2 + 1]
+    later = of.main[len(half) :]
+    taught, other = of.minor[::2], of.minor[1::2]
+    # Each minor cycle is put behind a main one, as on the simulated stage: what went before is wiped out.
+    turns = [k for n, minor in enumerate(taught) for k in (half[n % len(half)], minor)]
+    x = activations(basis, position)
+    good = of.friction.good
+
+    def exam(cycles: range | list[int]) -> Exam:
+        rows = of.rows(cycles)
+        return Exam.on(basis, of.friction, x=x, rows=rows[good[rows]])
+
+    main = Lesson(basis, *of.part(half), CYCLE if len(half) > 1 else 0)
+    return Lessons(main, Lesson(basis, *of.part(turns), 0), exam(later), exam(other))
+
+
+def cycles_on(of: Lessons, step: float, most: int, level: float, own: bool, seed: int) -> float:
+    """Return the cycles to 5 % of the recording's main loop with output noise of `level` over its peak.
+
+    own: judged on the loop learned from, without noise; else on the later cycles of the main loop.
+    """
+    lesson = replace(of.main, force_noise=level * of.on_main.peak, seed=seed)
+    rows = np.arange(lesson.again, lesson.force.size)
+    shown = Friction(lesson.force, lesson.position, lesson.force, np.ones(lesson.force.size, dtype=np.bool_))
+    exam = Exam.on(lesson.basis, shown, rows=rows) if own else of.on_main
+    return train(lesson, exam, step, most).cycles
