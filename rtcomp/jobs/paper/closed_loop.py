@@ -15,8 +15,8 @@ from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.identify import identify
 from rtcomp.jobs.paper.claim import Claim, Spread, ratio
 from rtcomp.jobs.paper.identification import Effort, case
-from rtcomp.jobs.paper.locality import since_reversal
 from rtcomp.jobs.paper.rig import ASYMMETRY, CYCLE, SOFTENING, rig
+from rtcomp.jobs.paper.shape import since_reversal
 from rtcomp.jobs.paper.training import model_of, train
 from rtcomp.kernels import Floats
 
@@ -110,20 +110,20 @@ def _on_steep(config: Configuration, models: Sequence[HysteresisModel], steep: f
 
 def compensation(effort: Effort, step: float, fastest: float) -> list[Claim]:
     """Test what section 4 says of the ideal case, of the bumps, and what it hopes of better places."""
-    ideal = [followed(rig(), papers_model((0.0, 0.0), step, s), to_and_fro(s)) for s in range(effort.seeds)]
-    real = [followed(rig(*FLAWED), papers_model(FLAWED, step, s), to_and_fro(s)) for s in range(effort.seeds)]
+    ideal = [followed(rig(), papers_model((0.0, 0.0), step, s), to_and_fro(s)) for s in range(effort.loops)]
+    real = [followed(rig(*FLAWED), papers_model(FLAWED, step, s), to_and_fro(s)) for s in range(effort.loops)]
     steep = steep_way(rig())
     found = [_bumps(done, steep) for done in real]
     where = (
         f"compensation in closed loop, simulated Leuven stage, 20 equal intervals trained {TAUGHT} cycles on the main "
-        f"loop by LMS (8) with step {step:g}, sines of 55 to 70 um at 0.8 to 1.2 Hz, {effort.seeds} seeds"
+        f"loop by LMS (8) with step {step:g}, sines of 55 to 70 um at 0.8 to 1.2 Hz, {effort.loops} seeds"
     )
     flawed = f"{where}; asymmetry {ASYMMETRY:g} and softening {SOFTENING:g} in the simulated friction"
     gain = Spread.of([d.improvement for d in ideal])
     peak = Spread.of([1e6 * d.error_with.peak for d in real])
     on_steep = Spread.of([100 * float(np.mean(b.way <= steep)) for b in found])
     chance = 100 * float(np.median([b.steep_share for b in found]))
-    seeds = range(effort.seeds)
+    seeds = range(effort.loops)
     at_pace = [followed(rig(), papers_model((0.0, 0.0), fastest, s), to_and_fro(s)).improvement for s in seeds]
     rls = [followed(rig(), _house((0.0, 0.0), "interval", 20), to_and_fro(s)).improvement for s in seeds]
     others = {
@@ -183,7 +183,7 @@ def placing(effort: Effort) -> Claim:
         for kind in ("interval", "self-placing"):
             model = _house(FLAWED, kind, count)
             peaks[kind] = [
-                followed(rig(*FLAWED), model, to_and_fro(s)).error_with.peak for s in range(effort.seeds)
+                followed(rig(*FLAWED), model, to_and_fro(s)).error_with.peak for s in range(effort.loops)
             ]
             numbers[f"peak_um_{count}_{'placed' if kind != 'interval' else 'equal'}"] = (
                 1e6 * Spread.of(peaks[kind]).median
@@ -193,7 +193,7 @@ def placing(effort: Effort) -> Claim:
     plain = [
         [
             followed(rig(), _house((0.0, 0.0), kind, FEW), to_and_fro(s)).error_with.peak
-            for s in range(effort.seeds)
+            for s in range(effort.loops)
         ]
         for kind in ("interval", "self-placing")
     ]
@@ -202,7 +202,7 @@ def placing(effort: Effort) -> Claim:
         "placing-helps", "an algorithm that optimises the interval setup would be the best way to deal with the bumps",
         found.median > 1.25, found, f"largest error, {FEW} equal intervals over {FEW} that place themselves", "times",
         "median above 1.25",
-        f"as above with RLS, `identify.model` interval and self-placing, 10 s of a triangle; {effort.seeds} seeds",
+        f"as above with RLS, `identify.model` interval and self-placing, 10 s of a triangle; {effort.loops} seeds",
         f"With 20 intervals it is {Spread.of(ratios[20]).median:.2g} times. Without the flaws it is "
         f"{numbers['ratio_without_flaws']:.2g} with {FEW}: places do not mend asymmetry.",
         numbers,

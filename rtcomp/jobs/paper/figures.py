@@ -11,9 +11,10 @@ import numpy as np
 from rtcomp.jobs.compensate import Compensated
 from rtcomp.jobs.paper.closed_loop import FLAWED, followed, papers_model
 from rtcomp.jobs.paper.identification import NOISE, case
-from rtcomp.jobs.paper.measured import Measured, measured_lessons, turning_points
+from rtcomp.jobs.paper.measured import Measured, measured_lessons
 from rtcomp.jobs.paper.minor import TAUGHT, Lessons, lessons_of
 from rtcomp.jobs.paper.rig import ASYMMETRY, CYCLE, SOFTENING, rig
+from rtcomp.jobs.paper.shape import apart, branches, mirrored
 from rtcomp.jobs.paper.training import LEVEL, Exam, Lesson, model_of, train
 from rtcomp.kernels import Floats
 
@@ -83,51 +84,6 @@ def identified(number: str, title: str, paper: str, lesson: Lesson, exam: Exam, 
         f"{source}; {lesson.basis.size} equal intervals, LMS (8) with step {step:g}", traces,
         numbers={"error": error, "cycles": float(cycles)},
     )  # fmt: skip
-
-
-def mirrored(position: Floats, force: Floats) -> tuple[Floats, Floats, float]:
-    """Return a closed loop turned half round about its middle, and how far the two lie apart at most.
-
-    position, force: one cycle, (K,). The distance (1) is over half the height, along branches of equal direction.
-    """
-    middle = 0.5 * (position.max() + position.min()), 0.5 * (force.max() + force.min())
-    x, y = 2 * middle[0] - position, 2 * middle[1] - force
-    grid = np.linspace(position.min(), position.max(), 401)[20:-20]
-
-    def rising(u: Floats, f: Floats) -> Floats:
-        low, high = int(np.argmin(u)), int(np.argmax(u))
-        order = np.arange(low, high + (0 if high > low else u.size)) % u.size
-        along = np.maximum.accumulate(u[order])
-        return np.interp(grid, along, f[order])
-
-    apart = np.abs(rising(position, force) - rising(x, y)).max()
-    return x, y, float(apart / (0.5 * np.ptp(force)))
-
-
-def branches(position: Floats, force: Floats, least: float) -> list[tuple[Floats, Floats]]:
-    """Return every branch between two reversals of `least` (m) with its turning point in the origin.
-
-    Falling branches are turned over, so that all rise: way (m) and force (N) since the reversal.
-    """
-    found = []
-    turns = turning_points(position, least)
-    for a, b in zip(turns[:-1], turns[1:], strict=True):
-        sign = np.sign(position[b] - position[a])
-        found.append((sign * (position[a : b + 1] - position[a]), sign * (force[a : b + 1] - force[a])))
-    return found
-
-
-def apart(found: Sequence[tuple[Floats, Floats]]) -> float:
-    """Return how far branches lie apart at most, over the height of the highest, where two reach as far (1)."""
-    height = max(float(y.max()) for _, y in found)
-    grid = np.linspace(0.0, max(float(x.max()) for x, _ in found), 200)
-    rows = [
-        np.where(grid <= x.max(), np.interp(grid, np.maximum.accumulate(x), y), np.nan) for x, y in found
-    ]
-    stack = np.array(rows)
-    several = np.sum(np.isfinite(stack), axis=0) >= 2
-    widest = np.nanmax(stack[:, several], axis=0) - np.nanmin(stack[:, several], axis=0)
-    return float(widest.max() / height)
 
 
 def symmetry(position: Floats, force: Floats, source: str) -> Remade:

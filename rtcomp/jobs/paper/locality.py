@@ -12,6 +12,7 @@ from rtcomp.hysteresis.stop import StopBasis
 from rtcomp.jobs.paper.claim import Claim, Spread, participation, ratio
 from rtcomp.jobs.paper.identification import Effort
 from rtcomp.jobs.paper.rig import CYCLE, INTERVALS, RANGE_M, main_loop, moved, rig
+from rtcomp.jobs.paper.shape import since_reversal
 from rtcomp.jobs.paper.training import Exam, Lesson, activations, train
 from rtcomp.kernels import Floats
 
@@ -19,18 +20,6 @@ WRONG, LONG = 0.05, 0.1
 """The disturbance: a step of the force over the peak, along this part of the range after each reversal."""
 DISTURBED = 60
 """Cycles of training with the disturbance, as many as the paper trains."""
-
-
-def since_reversal(position: Floats) -> Floats:
-    """Return the way (m) made since the last reversal at each row, (K,)."""
-    way = np.zeros(position.size)
-    moves = np.diff(position)
-    direction = 0.0
-    for k, move in enumerate(moves, 1):
-        turned = move * direction < 0.0
-        direction = np.sign(move) if move else direction
-        way[k] = abs(move) + (0.0 if turned else way[k - 1])
-    return way
 
 
 def changed(basis: Basis, loop: Lesson, exam: Exam, zone: tuple[float, float], step: float) -> Floats:

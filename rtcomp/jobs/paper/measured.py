@@ -13,6 +13,7 @@ from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.judge import Friction, friction_of
 from rtcomp.jobs.paper.minor import Lessons
 from rtcomp.jobs.paper.rig import CYCLE, INTERVALS
+from rtcomp.jobs.paper.shape import turning_points
 from rtcomp.jobs.paper.training import Exam, Lesson, activations, train
 from rtcomp.kernels import Floats
 from rtcomp.recording.reader import Recording
@@ -42,22 +43,6 @@ class Measured:
         """Return position (m or rad) and force (N or N m) of these cycles, one after the other."""
         rows = self.rows(cycles)
         return self.friction.position[rows], self.friction.force[rows]
-
-
-def turning_points(position: Floats, least: float) -> npt.NDArray[np.int64]:
-    """Return the rows where motion turns back by `least` (m) or more, highs and lows in turn."""
-    found: list[int] = []
-    best, way = 0, 0.0
-    for k in range(1, position.size):
-        if way == 0.0:
-            if abs(position[k] - position[0]) > least:
-                way, best = float(np.sign(position[k] - position[0])), k
-        elif way * (position[k] - position[best]) > 0.0:
-            best = k
-        elif way * (position[best] - position[k]) > least:
-            found.append(best)
-            way, best = -way, k
-    return np.array(found, dtype=np.int64)
 
 
 def cut(config: Configuration, recording: Recording) -> Measured:

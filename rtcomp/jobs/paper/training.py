@@ -97,6 +97,8 @@ class Lesson:
     position_noise: float = 0.0
     force_noise: float = 0.0
     seed: int = 0
+    noise_every: int = 1
+    """Rows between two draws of the position noise; straight lines between."""
 
     def cycles(self) -> Iterator[Taught]:
         """Give cycle after cycle of `CYCLE` samples, without end."""
@@ -109,7 +111,7 @@ class Lesson:
                 part = rows[start : start + CYCLE * _CHUNK]
                 u = self.position[part]
                 if self.position_noise:
-                    u = u + self.position_noise * chance.uniform(-1, 1, u.size)
+                    u = u + self.position_noise * self._noise(chance, u.size)
                 x = activations(self.basis, u, state, held)
                 force = self.force[part]
                 if self.force_noise:
@@ -117,6 +119,12 @@ class Lesson:
                 for k in range(0, part.size, CYCLE):
                     yield x[k : k + CYCLE], force[k : k + CYCLE]
             rows = np.arange(self.again, self.force.size)
+
+    def _noise(self, chance: np.random.Generator, rows: int) -> Floats:
+        if self.noise_every == 1:
+            return chance.uniform(-1, 1, rows)
+        draws = chance.uniform(-1, 1, rows // self.noise_every + 2)
+        return np.interp(np.arange(rows) / self.noise_every, np.arange(draws.size), draws)
 
 
 @dataclass(frozen=True)
