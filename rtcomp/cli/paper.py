@@ -33,7 +33,8 @@ def paper(
 ) -> None:
     """Make figures 9a to 15 of the paper anew and test each claim of its text: true or false, with a number.
 
-    All on the simulated Leuven stage. In the place of the paper's real setup stands that stage with asymmetric
+    All on the simulated Leuven stage. In the place of the paper's real setup stands that stage with
+    asymmetric
     and non-congruent friction or, for figures 10 to 12, a RECORDING that holds a main loop several times and
     minor loops. The folder holds paper.html and paper.json.
 
@@ -63,9 +64,7 @@ def paper(
         measured = cut(axis, read(recording, {**section.map, **mapping}, rate_hz=section.rate))
     with prepare_output(out, force) as work:
         with Steps(quiet=as_json) as steps:
-            done = study(
-                QUICK if quick else Effort(), measured, lambda part, name: steps.update(name, part)
-            )
+            done = study(QUICK if quick else Effort(), measured, lambda part, name: steps.update(name, part))
         told = done.to_json()
         write_text(work / "paper.json", to_json(told) + "\n")
         write_page(work / "paper.html", paper_page(done))

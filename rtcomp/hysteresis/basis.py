@@ -119,7 +119,14 @@ def regressors(
     inputs = np.ascontiguousarray(inputs, dtype=np.float64)
     out = np.empty((inputs.size, basis.size))
     state = basis.initial_state() if state is None else state
-    _run(basis.kernel.address, basis.vector(), state, np.zeros(basis.size) if held is None else held, inputs, out)
+    _run(
+        basis.kernel.address,
+        basis.vector(),
+        state,
+        np.zeros(basis.size) if held is None else held,
+        inputs,
+        out,
+    )
     return out
 
 

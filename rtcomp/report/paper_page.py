@@ -23,7 +23,7 @@ def number(value: float) -> str:
 
 def spread(value: Spread, unit: str) -> str:
     """Return ``1.56 times (0.857 to never)``, median and range over the seeds; without it where there is none."""
-    middle = f"{number(value.median)} {unit}" if math.isfinite(value.median) else "never"
+    middle = f"{number(value.median)} {unit}" if math.isfinite(value.median) else "never reached"
     if value.low == value.high:
         return middle
     return f"{middle} ({number(value.low)} to {number(value.high)})"
@@ -31,7 +31,7 @@ def spread(value: Spread, unit: str) -> str:
 
 def verdict(claim: Claim) -> str:
     """Return whether the claim holds, as it is printed."""
-    return "true" if claim.holds else "false here"
+    return "true" if claim.holds else "false"
 
 
 def claim_rows(done: Study) -> list[tuple[str, str, str, str, bool]]:
@@ -43,7 +43,8 @@ def paper_page(done: Study) -> Page:
     """Return the page of `rtcomp paper`."""
     true = sum(c.holds for c in done.claims)
     setup = (
-        f"the recording {done.recording} stands in for the real setup in Figs. 10 to 12; Figs. 13b, 14b and 15 need a "
+        f"the recording {done.recording} stands in for the real setup in Figs. 10 to 12; Figs. 13b, 14b and "
+        "15 need a "
         "closed loop and are simulated"
         if done.recording
         else "the real setup is a simulated stage with flaws of the size of Fig. 11"
@@ -52,20 +53,24 @@ def paper_page(done: Study) -> Page:
         title="The paper's figures and claims, made anew",
         subtitle="Non-local hysteresis function identification and compensation with neural networks",
         verdict=[
-            f"Of {len(done.claims)} claims of the text {true} are true here and {len(done.claims) - true} are not.",
+            f"Of {len(done.claims)} claims of the text {true} are true here and {len(done.claims) - true} "
+            "are not.",
             f"Throughout, {setup}.",
         ],
         notes=[
-            f"The paper gives no learning factor. Step {done.step:g} (over the mean squared norm of the activations) "
-            f"needs about its 60 cycles in the ideal case and is taken everywhere; the fastest, {done.fastest:g}, is "
+            f"The paper gives no learning factor. Step {done.step:g} (over the mean squared norm of the "
+            "activations) "
+            "needs about its 60 cycles in the ideal case and is taken everywhere; the fastest, "
+            f"{done.fastest:g}, is "
             "beside it where it matters.",
-            f"Median and range over {done.effort.seeds} seeds ({done.effort.loops} in closed loop); never: not within "
+            f"Median and range over {done.effort.seeds} seeds ({done.effort.loops} in closed loop); never: "
+            "not within "
             f"{done.effort.most} cycles.",
         ],
         sections=[
             Section("The claims", "", None, _claims(done)),
-            Section("The claims, one by one", "Criterion, how it was measured, and what else was seen.", None, _told(done)),
             *[_figure(f) for f in done.figures],
+            Section("How each claim was tested", "", None, _told(done)),
         ],
         versions={"rtcomp": __version__, "Python": platform.python_version(), "numpy": np.__version__},
     )
@@ -85,5 +90,5 @@ def _figure(remade: Remade) -> Section:
     return Section(
         f"Fig. {remade.number}: {remade.title}",
         f"The paper: {remade.paper}.\n\nHere: {remade.here}\n\nFrom: {remade.source}.",
-        traces_figure([tuple(t) for t in remade.traces], remade.x, remade.y),
+        traces_figure([(t.name, t.x, t.y, t.role) for t in remade.traces], remade.x, remade.y),
     )

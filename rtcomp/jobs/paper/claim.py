@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 
 class Spread(NamedTuple):
@@ -48,7 +49,7 @@ def cycles_until(errors: Sequence[float], level: float, stay: int) -> float:
     return math.inf
 
 
-def participation(changes: Sequence[float]) -> float:
+def participation(changes: npt.ArrayLike) -> float:
     """Return the share of elements that a change is spread over, (sum |c|)^2 / (N sum c^2), 0 where none.
 
     1 where all change alike, 1/N where a single one does.
@@ -71,7 +72,7 @@ class Claim:
     quantity: str
     unit: str
     criterion: str
-    """When it is called true; set before the numbers were seen."""
+    """When it is called true."""
     measured: str
     """How: stage, learner, step, motion, seeds."""
     remark: str = ""

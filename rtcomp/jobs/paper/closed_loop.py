@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
-from rtcomp.hysteresis.interval import IntervalBasis
+from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.jobs.compensate import Compensated, compensate
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.identify import identify
 from rtcomp.jobs.paper.claim import Claim, Spread, ratio
 from rtcomp.jobs.paper.identification import Effort, case
-from rtcomp.jobs.paper.rig import ASYMMETRY, CYCLE, SOFTENING, rig
+from rtcomp.jobs.paper.rig import ASYMMETRY, SOFTENING, rig
 from rtcomp.jobs.paper.shape import since_reversal
 from rtcomp.jobs.paper.training import model_of, train
 from rtcomp.kernels import Floats
@@ -75,13 +76,16 @@ class Bumps:
 
 def steep_way(config: Configuration) -> float:
     """Return how far (m) after a reversal the true branch is at least half as steep as where it begins."""
-    elements = sorted(config.run.stage.friction, key=lambda e: e.reach)  # type: ignore[arg-type, union-attr]
+    friction = config.run.stage.friction
+    if not isinstance(friction, list):
+        raise ConfigError(f"{config.path}: stage.friction is no list of elements; its slope is not known")
+    elements = sorted(friction, key=lambda e: e.reach)
     left = total = sum(e.stiffness for e in elements)
     for element in elements:
         left -= element.stiffness
         if left < 0.5 * total:
-            return float(2.0 * element.reach)
-    return float(2.0 * elements[-1].reach)
+            break
+    return float(2.0 * element.reach)
 
 
 def bumps_of(reference: Floats, error: Floats, steep: float) -> Bumps:
@@ -91,7 +95,9 @@ def bumps_of(reference: Floats, error: Floats, steep: float) -> Bumps:
     """
     way = since_reversal(reference)
     turns = np.flatnonzero(np.diff(way) < 0.0) + 1
-    peaks = [low + int(np.argmax(np.abs(error[low:high]))) for low, high in zip(turns[:-1], turns[1:], strict=True)]
+    peaks = [
+        low + int(np.argmax(np.abs(error[low:high]))) for low, high in itertools.pairwise(turns)
+    ]
     rows = way[turns[0] : turns[-1]] if turns.size > 1 else way
     return Bumps(way[peaks], np.abs(error[peaks]), float(np.mean(rows <= steep)))
 
@@ -102,10 +108,11 @@ def _bumps(done: Compensated, steep: float) -> Bumps:
     return bumps_of(c["reference"][kept], (c["reference"] - c["position"])[kept], steep)
 
 
-def _on_steep(config: Configuration, models: Sequence[HysteresisModel], steep: float) -> float:
-    """Return the half cycles (%) whose largest error lies on the steepest part, the k-th model on seed k."""
-    done = [_bumps(followed(config, model, to_and_fro(k)), steep) for k, model in enumerate(models)]
-    return Spread.of([100 * float(np.mean(b.way <= steep)) for b in done]).median
+def _peaks(flaws: tuple[float, float], step: float, loops: int, steep: float) -> Floats:
+    """Return how far (m) after a reversal the largest errors of all seeds lie, (B,)."""
+    config = rig(*flaws)
+    done = [followed(config, papers_model(flaws, step, s), to_and_fro(s)) for s in range(loops)]
+    return np.concatenate([_bumps(d, steep).way for d in done])
 
 
 def compensation(effort: Effort, step: float, fastest: float) -> list[Claim]:
@@ -115,7 +122,8 @@ def compensation(effort: Effort, step: float, fastest: float) -> list[Claim]:
     steep = steep_way(rig())
     found = [_bumps(done, steep) for done in real]
     where = (
-        f"compensation in closed loop, simulated Leuven stage, 20 equal intervals trained {TAUGHT} cycles on the main "
+        f"compensation in closed loop, simulated Leuven stage, 20 equal intervals trained {TAUGHT} cycles "
+        "on the main "
         f"loop by LMS (8) with step {step:g}, sines of 55 to 70 um at 0.8 to 1.2 Hz, {effort.loops} seeds"
     )
     flawed = f"{where}; asymmetry {ASYMMETRY:g} and softening {SOFTENING:g} in the simulated friction"
@@ -124,17 +132,15 @@ def compensation(effort: Effort, step: float, fastest: float) -> list[Claim]:
     on_steep = Spread.of([100 * float(np.mean(b.way <= steep)) for b in found])
     chance = 100 * float(np.median([b.steep_share for b in found]))
     seeds = range(effort.loops)
-    at_pace = [followed(rig(), papers_model((0.0, 0.0), fastest, s), to_and_fro(s)).improvement for s in seeds]
+    at_pace = [
+        followed(rig(), papers_model((0.0, 0.0), fastest, s), to_and_fro(s)).improvement for s in seeds
+    ]
     rls = [followed(rig(), _house((0.0, 0.0), "interval", 20), to_and_fro(s)).improvement for s in seeds]
-    others = {
-        "steep_percent_ideal": _on_steep(rig(), [papers_model((0.0, 0.0), step, s) for s in seeds], steep),
-        f"steep_percent_ideal_step_{fastest:g}": _on_steep(
-            rig(), [papers_model((0.0, 0.0), fastest, s) for s in seeds], steep
-        ),
-        f"steep_percent_step_{fastest:g}": _on_steep(
-            rig(*FLAWED), [papers_model(FLAWED, fastest, s) for s in seeds], steep
-        ),
-    }
+    others = {}
+    for name, flaws in (("ideal", (0.0, 0.0)), ("real", FLAWED)):
+        ways = _peaks(flaws, fastest, effort.loops, steep)
+        others[f"steep_percent_{name}_step_{fastest:g}"] = 100 * float(np.mean(ways <= steep))
+        others[f"peaks_after_um_{name}_step_{fastest:g}"] = 1e6 * float(np.median(ways))
     after = 1e6 * float(np.median(np.concatenate([b.way for b in found])))
     lost = [ratio(i.improvement, r.improvement) for i, r in zip(ideal, real, strict=True)]
     return [
@@ -153,7 +159,8 @@ def compensation(effort: Effort, step: float, fastest: float) -> list[Claim]:
             "bumps-of-5-um", "in the real setup the approximation errors cause visible bumps of about 5 um",
             2.5 <= peak.median <= 10.0, peak, "largest error with compensation", "um",
             "median between 2.5 and 10 um", flawed,
-            "The size depends on the gain of the controller, which the paper does not give; here it is a PID.",
+            "The size depends on the gain of the controller, which the paper does not give; here it is a "
+            "PID.",
             {"peak_without_um": Spread.of([1e6 * d.error_without.peak for d in real]).median,
              "improvement": Spread.of([d.improvement for d in real]).median,
              "improvement_ideal_over_real": Spread.of(lost).median},
@@ -162,12 +169,17 @@ def compensation(effort: Effort, step: float, fastest: float) -> list[Claim]:
             "bumps-at-the-steepest", "the bumps appear where the model does not fit the steepest parts of the branches",
             on_steep.median > 50.0 and on_steep.median > chance, on_steep,
             "half cycles whose largest error lies on the steepest part", "%",
-            "median above 50 %, and above what peaks at random would hit; steepest: at least half as steep as right "
+            "median above 50 %, and above what peaks at random would hit; steepest: at least half as steep "
+            "as right "
             "after the reversal",
             flawed,
-            f"At random it would be {chance:.0f} %; the steepest part ends {1e6 * steep:.0f} um after the reversal, the "
-            f"peaks come {after:.0f} um after it. With asymmetric friction the error is broad, not a bump. Without the "
-            f"flaws and with the fastest step it is {others[f'steep_percent_ideal_step_{fastest:g}']:.0f} %.",
+            f"At random it would be {chance:.0f} %; the steepest part ends {1e6 * steep:.0f} um after the "
+            f"reversal, the peaks come {after:.0f} um after it. Slow training leaves its error where the "
+            "last "
+            "intervals end, asymmetry leaves a broad one. Trained with the fastest step and without the "
+            "flaws it "
+            f"is {others[f'steep_percent_ideal_step_{fastest:g}']:.0f} %, "
+            f"{others[f'peaks_after_um_ideal_step_{fastest:g}']:.0f} um after the reversal.",
             {"at_random_percent": chance, "steep_until_um": 1e6 * steep, "peaks_after_um": after, **others},
         ),
         placing(effort),
@@ -202,7 +214,8 @@ def placing(effort: Effort) -> Claim:
         "placing-helps", "an algorithm that optimises the interval setup would be the best way to deal with the bumps",
         found.median > 1.25, found, f"largest error, {FEW} equal intervals over {FEW} that place themselves", "times",
         "median above 1.25",
-        f"as above with RLS, `identify.model` interval and self-placing, 10 s of a triangle; {effort.loops} seeds",
+        f"as above with RLS, `identify.model` interval and self-placing, 10 s of a triangle; {effort.loops} "
+        "seeds",
         f"With 20 intervals it is {Spread.of(ratios[20]).median:.2g} times. Without the flaws it is "
         f"{numbers['ratio_without_flaws']:.2g} with {FEW}: places do not mend asymmetry.",
         numbers,

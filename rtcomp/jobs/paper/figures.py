@@ -14,15 +14,13 @@ from rtcomp.jobs.paper.identification import NOISE, case
 from rtcomp.jobs.paper.measured import Measured, measured_lessons
 from rtcomp.jobs.paper.minor import TAUGHT, Lessons, lessons_of
 from rtcomp.jobs.paper.rig import ASYMMETRY, CYCLE, SOFTENING, rig
-from rtcomp.jobs.paper.shape import apart, branches, mirrored
-from rtcomp.jobs.paper.training import LEVEL, Exam, Lesson, model_of, train
+from rtcomp.jobs.paper.shape import apart, branches, mirrored, to_and_back
+from rtcomp.jobs.paper.training import LEVEL, Exam, Lesson, train
 from rtcomp.kernels import Floats
 
 SHOWN_S = (3.0, 5.5)
 """Part of a run in closed loop that is drawn."""
-STAND_IN = (
-    f"simulated stage with asymmetry {ASYMMETRY:g} and softening {SOFTENING:g}, in the place of the real setup"
-)
+STAND_IN = f"simulated stage with asymmetry {ASYMMETRY:g} and softening {SOFTENING:g}, in the place of the real setup"
 
 
 class Trace(NamedTuple):
@@ -67,8 +65,7 @@ def identified(number: str, title: str, paper: str, lesson: Lesson, exam: Exam, 
                cycles: int = 60) -> Remade:  # fmt: skip
     """Return a loop and the model trained on it for as many cycles as the paper needed."""
     done = train(lesson, exam, step, cycles, whole=True)
-    model = model_of(lesson.basis, done.weights)
-    said = model.response(lesson.position)
+    said = lesson.activations() @ done.weights
     last = slice(-CYCLE, None)
     driven = lesson.position[last]
     if lesson.position_noise:
@@ -97,9 +94,8 @@ def symmetry(position: Floats, force: Floats, source: str) -> Remade:
     )  # fmt: skip
 
 
-def congruency(position: Floats, force: Floats, source: str) -> Remade:
+def congruency(found: Sequence[tuple[Floats, Floats]], source: str) -> Remade:
     """Return Fig. 11b: the branches of main and minor loops, their turning points in the origin."""
-    found = branches(position, force, 0.05 * float(np.ptp(position)))
     far = apart(found)
     largest = max(range(len(found)), key=lambda k: found[k][0].max())
     gap = np.array([np.nan])
@@ -119,16 +115,19 @@ def congruency(position: Floats, force: Floats, source: str) -> Remade:
     )  # fmt: skip
 
 
-def on_minor(number: str, title: str, paper: str, lessons: Lessons, step: float, both: bool, source: str) -> Remade:
+def on_minor(
+    number: str, title: str, paper: str, lessons: Lessons, step: float, both: bool, source: str
+) -> Remade:
     """Return Fig. 12a or 12b: minor and main loops, and the model trained on the main one, or on both."""
     weights = train(lessons.both if both else lessons.main, lessons.on_main, step, TAUGHT, whole=True).weights
     shown = lessons.both
-    said = model_of(shown.basis, weights).response(shown.position)
+    said = shown.activations() @ weights
     last = slice(-4 * CYCLE, None)
     on_main, on_small = lessons.on_main.error(weights), lessons.on_minor.error(weights)
     return Remade(
         number, title, paper,
-        f"Frozen, it is off by {_percent(on_small)} on other minor loops and {_percent(on_main)} on the main loop.",
+        f"Frozen, it is off by {_percent(on_small)} on other minor loops and {_percent(on_main)} on the "
+        "main loop.",
         f"{source}; LMS (8) with step {step:g}, {TAUGHT} cycles",
         [Trace("measured", shown.position[last], shown.force[last], "measured"),
          Trace("model", shown.position[last], said[last], "model")],
@@ -136,17 +135,24 @@ def on_minor(number: str, title: str, paper: str, lessons: Lessons, step: float,
     )  # fmt: skip
 
 
-def _tracked(number: str, title: str, paper: str, done: Compensated, compensated: bool, source: str) -> Remade:
+def _tracked(
+    number: str, title: str, paper: str, done: Compensated, compensated: bool, source: str
+) -> Remade:
     run = done.with_it if compensated else done.without
     size = done.error_with if compensated else done.error_without
     c = run.columns
     rows = (c["time"] >= SHOWN_S[0]) & (c["time"] <= SHOWN_S[1])
+    desired, actual = c["reference"][rows], c["position"][rows]
+    traces = [
+        Trace("desired", c["time"][rows], desired, "reference"),
+        Trace("actual", c["time"][rows], actual, "with" if compensated else "without"),
+    ]
+    if compensated:
+        traces.append(Trace("error, 10 times", c["time"][rows], 10.0 * (desired - actual), "model"))
     return Remade(
         number, title, paper,
         f"The tracking error is {1e6 * size.rms:.2g} um rms, {1e6 * size.peak:.2g} um at most.", source,
-        [Trace("desired", c["time"][rows], c["reference"][rows], "reference"),
-         Trace("actual", c["time"][rows], c["position"][rows], "with" if compensated else "without")],
-        ("Time", "s"), ("Position", "m"), {"error_rms_um": 1e6 * size.rms, "error_peak_um": 1e6 * size.peak},
+        traces, ("Time", "s"), ("Position", "m"), {"error_rms_um": 1e6 * size.rms, "error_peak_um": 1e6 * size.peak},
     )  # fmt: skip
 
 
@@ -188,20 +194,22 @@ def _of_setup(step: float, measured: Measured | None) -> list[Remade]:
         lessons = lessons_of(*FLAWED, 0)
         source = STAND_IN
         cycle = of.lesson.position[-CYCLE:], of.lesson.force[-CYCLE:]
-        several = lessons.both.position[CYCLE:], lessons.both.force[CYCLE:]
+        moves = lessons.both.position[CYCLE:]
+        several = branches(moves, lessons.both.force[CYCLE:], 0.05 * float(np.ptp(moves)))
         first, judged = of.lesson, of.held_out
     else:
         lessons = measured_lessons(measured)
         source = f"recording {measured.name}"
         last = measured.main[-1]
         cycle = measured.part([last])
-        several = measured.friction.position, measured.friction.force
+        pairs = [measured.part([k]) for k in [*measured.minor, *measured.main[1:]]]
+        several = [branch for pair in pairs for branch in to_and_back(*pair)]
         first, judged = lessons.main, lessons.on_main
     found = [
         identified("10", "Real setup, main loop", "much slower than in the simulation (no number)", first, judged,
                    step, source),
         symmetry(*cycle, source),
-        congruency(*several, source),
+        congruency(several, source),
         on_minor("12a", "Minor loops, trained on the main loop only", "smooth, with a large error on minor loops",
                  lessons, step, False, source),
         on_minor("12b", "Minor loops, trained on minor loops too",

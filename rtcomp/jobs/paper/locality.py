@@ -25,7 +25,8 @@ DISTURBED = 60
 def changed(basis: Basis, loop: Lesson, exam: Exam, zone: tuple[float, float], step: float) -> Floats:
     """Return by what force (N, (N,)) a local disturbance of the loop in `zone` (m after reversals) moves each weight.
 
-    It is trained with and without the disturbance and the two are compared. As (8) is linear, that is the same
+    It is trained with and without the disturbance and the two are compared. As (8) is linear, that is the
+    same
     from whatever weights.
     """
     lesson = replace(loop, basis=basis)
@@ -72,7 +73,8 @@ def locality(effort: Effort, step: float, fastest: float) -> list[Claim]:
             "interval weights that one sample moves (over the samples of a cycle)", "%",
             "median below 80 %, and of the stop basis above",
             "simulated Leuven stage, 20 elements each, (8) on every sample of a cycle of the main loop",
-            f"Of the stop weights it is {100 * touched['stop'].median:.0f} %. An interval already filled has its whole "
+            f"Of the stop weights it is {100 * touched['stop'].median:.0f} %. An interval already filled "
+            "has its whole "
             "width for x_i and is moved as well, wherever the error came from.",
             {"moved_percent_stop": 100 * touched["stop"].median},
         ),
@@ -80,10 +82,13 @@ def locality(effort: Effort, step: float, fastest: float) -> list[Claim]:
             "local-errors", "local errors in the training data appear localized in the trained model",
             found.median < 0.8, found, "share of weights that take part, interval over stop basis", "times",
             "median below 0.8; share (sum |c|)^2 / (N sum c^2) of the changes c in force",
-            f"simulated Leuven stage, 20 elements each, LMS (8) with step {step:g}, {DISTURBED} cycles with the force "
-            f"off by {100 * WRONG:g} % of the peak along a tenth of the range after each reversal, against as many "
+            f"simulated Leuven stage, 20 elements each, LMS (8) with step {step:g}, {DISTURBED} cycles with "
+            "the force "
+            f"off by {100 * WRONG:g} % of the peak along a tenth of the range after each reversal, against "
+            "as many "
             f"without; {effort.seeds} places",
-            f"With the fastest step, {fastest:g}, it is {soon.median:.2g}: an error begins spread over every filled "
+            f"With the fastest step, {fastest:g}, it is {soon.median:.2g}: an error begins spread over "
+            "every filled "
             "interval and gathers in its place as training goes on."
             if soon.median < found.median
             else "",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,11 +37,11 @@ class Measured:
     axis: str
     name: str
 
-    def rows(self, cycles: range | list[int]) -> npt.NDArray[np.int64]:
+    def rows(self, cycles: Sequence[int]) -> npt.NDArray[np.int64]:
         """Return the rows of these cycles."""
         return np.concatenate([np.arange(k * CYCLE, (k + 1) * CYCLE) for k in cycles])
 
-    def part(self, cycles: range | list[int]) -> tuple[Floats, Floats]:
+    def part(self, cycles: Sequence[int]) -> tuple[Floats, Floats]:
         """Return position (m or rad) and force (N or N m) of these cycles, one after the other."""
         rows = self.rows(cycles)
         return self.friction.position[rows], self.friction.force[rows]
@@ -60,29 +62,43 @@ def cut(config: Configuration, recording: Recording) -> Measured:
     position = shown.position
     turns = turning_points(position, TURN * float(np.ptp(position)))
     lows = [int(t) for k, t in enumerate(turns) if position[t] < position[turns[k - 1 if k else 1]]]
-    travel = np.array([np.ptp(position[a : b + 1]) for a, b in zip(lows[:-1], lows[1:], strict=True)])
+    travel = np.array([np.ptp(position[a : b + 1]) for a, b in itertools.pairwise(lows)])
     main = _main(travel)
     if main is None:
         raise RecordingError(
-            f"{recording.path}: no loop comes {LEAST_MAIN} times in a row within {100 * ALIKE:g} % of its travel "
+            f"{recording.path}: no loop comes {LEAST_MAIN} times in a row within {100 * ALIKE:g} % of its "
+            "travel "
             f"({travel.size} cycles were found); record the main loop at least {LEAST_MAIN} times"
         )
     size = float(np.median(travel[main.start : main.stop]))
-    minor = [k for k, t in enumerate(travel) if t < (1.0 - 2.0 * ALIKE) * size]
+    ends = list(itertools.pairwise(lows))
+    minor = [
+        k
+        for k, t in enumerate(travel)
+        if t < (1.0 - 2.0 * ALIKE) * size and closed(position[slice(*ends[k])], shown.force[slice(*ends[k])])
+    ]
     if len(minor) < LEAST_MINOR:
         raise RecordingError(
-            f"{recording.path}: {len(minor)} loops are clearly smaller than the main one; at least {LEAST_MINOR} are "
+            f"{recording.path}: {len(minor)} closed loops are clearly smaller than the main one; at least "
+            f"{LEAST_MINOR} are "
             "needed: record minor loops too"
         )
     rows = np.concatenate(
-        [np.linspace(a, b, CYCLE, endpoint=False) for a, b in zip(lows[:-1], lows[1:], strict=True)]
+        [np.linspace(a, b, CYCLE, endpoint=False) for a, b in itertools.pairwise(lows)]
     )
     count = np.arange(position.size, dtype=np.float64)
     even = Friction(
-        np.interp(rows, count, shown.time), np.interp(rows, count, position), np.interp(rows, count, shown.force),
+        np.interp(rows, count, shown.time), np.interp(rows, count, position), np.interp(rows, count,
+        shown.force),
         np.interp(rows, count, shown.good.astype(np.float64)) > 0.5,
     )  # fmt: skip
     return Measured(even, main, minor, config.stage.axis, recording.path.name)
+
+
+def closed(position: Floats, force: Floats) -> bool:
+    """Say whether a cycle ends where it began, within a tenth of its size both ways, and nowhere jumps by as much."""
+    ends = [abs(a[-1] - a[0]) <= 0.1 * np.ptp(a) for a in (position, force)]
+    return bool(all(ends) and np.abs(np.diff(force)).max() <= 0.1 * np.ptp(force))
 
 
 def _main(travel: Floats) -> range | None:
@@ -97,24 +113,27 @@ def _main(travel: Floats) -> range | None:
 
 
 def measured_lessons(of: Measured) -> Lessons:
-    """Return the lessons of a recording: every other cycle of either kind is learned from, the others judged."""
-    position = of.friction.position
+    """Return the lessons of a recording: every other cycle of either kind is learned from, the others judged.
+
+    The operator goes through the whole recording once, from the virgin state, so that it remembers what the
+    axis
+    did before each cycle.
+    """
     size = float(np.median([np.ptp(of.part([k])[0]) for k in of.main]))
     basis = IntervalBasis.over(INTERVALS, size)
-    half = of.main[: len(of.main) // 2 + 1]
-    later = of.main[len(half) :]
-    taught, other = of.minor[::2], of.minor[1::2]
-    # Each minor cycle is put behind a main one, as on the simulated stage: what went before is wiped out.
-    turns = [k for n, minor in enumerate(taught) for k in (half[n % len(half)], minor)]
-    x = activations(basis, position)
-    good = of.friction.good
+    x = activations(basis, of.friction.position)
 
-    def exam(cycles: range | list[int]) -> Exam:
+    def lesson(cycles: Sequence[int]) -> Lesson:
         rows = of.rows(cycles)
-        return Exam.on(basis, of.friction, x=x, rows=rows[good[rows]])
+        return Lesson(basis, *of.part(cycles), 0, known=x[rows])
 
-    main = Lesson(basis, *of.part(half), CYCLE if len(half) > 1 else 0)
-    return Lessons(main, Lesson(basis, *of.part(turns), 0), exam(later), exam(other))
+    def exam(cycles: Sequence[int]) -> Exam:
+        rows = of.rows(cycles)
+        return Exam.on(basis, of.friction, x=x, rows=rows[of.friction.good[rows]])
+
+    # The first of the main loop still wipes out what the smaller ones left.
+    main, later = of.main[1::2], of.main[2::2]
+    return Lessons(lesson(main), lesson([*of.minor[::2], *main]), exam(later), exam(of.minor[1::2]))
 
 
 def cycles_on(of: Lessons, step: float, most: int, level: float, own: bool, seed: int) -> float:
@@ -123,7 +142,7 @@ def cycles_on(of: Lessons, step: float, most: int, level: float, own: bool, seed
     own: judged on the loop learned from, without noise; else on the later cycles of the main loop.
     """
     lesson = replace(of.main, force_noise=level * of.on_main.peak, seed=seed)
-    rows = np.arange(lesson.again, lesson.force.size)
-    shown = Friction(lesson.force, lesson.position, lesson.force, np.ones(lesson.force.size, dtype=np.bool_))
-    exam = Exam.on(lesson.basis, shown, rows=rows) if own else of.on_main
+    every = np.arange(of.main.force.size)
+    shown = Friction(of.main.force, of.main.position, of.main.force, every >= 0)
+    exam = Exam.on(lesson.basis, shown, x=of.main.activations(), rows=every) if own else of.on_main
     return train(lesson, exam, step, most).cycles

@@ -25,7 +25,8 @@ ASYMMETRY, SOFTENING = 0.1, 0.3
 def rig(asymmetry: float = 0.0, softening: float = 0.0) -> Configuration:
     """Return the shipped Leuven stage without sensor noise, with the flaws in its simulated friction.
 
-    What the loop believes has no flaws, as in the paper. `asymmetry` and `softening` are the parameters of the
+    What the loop believes has no flaws, as in the paper. `asymmetry` and `softening` are the parameters of
+    the
     effects `asymmetric-friction` and `non-congruent-friction` (both 1).
     """
     base = Configuration.load(shipped("leuven.yaml"))

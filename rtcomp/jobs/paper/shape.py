@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -41,7 +42,8 @@ def turning_points(position: Floats, least: float) -> npt.NDArray[np.int64]:
 def mirrored(position: Floats, force: Floats) -> tuple[Floats, Floats, float]:
     """Return a closed loop turned half round about its middle, and how far the two lie apart at most.
 
-    position, force: one cycle, (K,). The distance (1) is over half the height, along branches of equal direction.
+    position, force: one cycle, (K,). The distance (1) is over half the height, along branches of equal
+    direction.
     """
     middle = 0.5 * (position.max() + position.min()), 0.5 * (force.max() + force.min())
     x, y = 2 * middle[0] - position, 2 * middle[1] - force
@@ -64,19 +66,26 @@ def branches(position: Floats, force: Floats, least: float) -> list[tuple[Floats
     """
     found = []
     turns = turning_points(position, least)
-    for a, b in zip(turns[:-1], turns[1:], strict=True):
+    for a, b in itertools.pairwise(turns):
         sign = np.sign(position[b] - position[a])
         found.append((sign * (position[a : b + 1] - position[a]), sign * (force[a : b + 1] - force[a])))
     return found
+
+
+def to_and_back(position: Floats, force: Floats) -> list[tuple[Floats, Floats]]:
+    """Return both branches of a cycle from low to low as `branches` does: noise makes no reversal."""
+    top = int(np.argmax(position))
+    return [
+        (position[: top + 1] - position[0], force[: top + 1] - force[0]),
+        (position[top] - position[top:], force[top] - force[top:]),
+    ]
 
 
 def apart(found: Sequence[tuple[Floats, Floats]]) -> float:
     """Return how far branches lie apart at most, over the height of the highest, where two reach as far (1)."""
     height = max(float(y.max()) for _, y in found)
     grid = np.linspace(0.0, max(float(x.max()) for x, _ in found), 200)
-    rows = [
-        np.where(grid <= x.max(), np.interp(grid, np.maximum.accumulate(x), y), np.nan) for x, y in found
-    ]
+    rows = [np.where(grid <= x.max(), np.interp(grid, np.maximum.accumulate(x), y), np.nan) for x, y in found]
     stack = np.array(rows)
     several = np.sum(np.isfinite(stack), axis=0) >= 2
     widest = np.nanmax(stack[:, several], axis=0) - np.nanmin(stack[:, several], axis=0)

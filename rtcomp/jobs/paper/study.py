@@ -85,7 +85,8 @@ def _of_recording(effort: Effort, step: float, measured: Measured) -> list[Claim
     lessons = measured_lessons(measured)
     basis = lessons.main.basis
     where = (
-        f"recording {measured.name}, {basis.size} equal intervals over the main loop's travel, LMS (8) with step {step:g}, "
+        f"recording {measured.name}, {basis.size} equal intervals over the main loop's travel, LMS (8) with "
+        f"step {step:g}, "
         "every other cycle learned from, the others judged, each taken as 1000 samples"
     )
     ours = cycles_on(lessons, step, effort.most, 0.0, False, 0)

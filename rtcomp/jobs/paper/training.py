@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rtcomp.hysteresis.basis import Basis, regressors
 from rtcomp.hysteresis.interval import IntervalBasis
@@ -65,8 +67,7 @@ class Exam:
     """N, the largest force."""
 
     @classmethod
-    def on(cls, basis: Basis, shown: Friction, settle: int = CYCLE, x: Floats | None = None,
-           rows: Floats | None = None) -> Exam:  # fmt: skip
+    def on(cls, basis: Basis, shown: Friction, settle: int = CYCLE, x: Floats | None = None, rows: npt.NDArray[np.integer[Any]] | None = None) -> Exam:  # fmt: skip
         """Judge on `shown`, its first `settle` rows left out, or on the given `rows` (indices) of it.
 
         `x` are its activations where they are known.
@@ -86,7 +87,8 @@ class Exam:
 class Lesson:
     """A recorded motion to train on: its rows once, then from row `again` on over and over.
 
-    Noise is uniform and drawn anew for every sample: `position_noise` (m) in what the operator is driven with,
+    Noise is uniform and drawn anew for every sample: `position_noise` (m) in what the operator is driven
+    with,
     `force_noise` (N) in what it is to say.
     """
 
@@ -99,6 +101,12 @@ class Lesson:
     seed: int = 0
     noise_every: int = 1
     """Rows between two draws of the position noise; straight lines between."""
+    known: Floats | None = None
+    """Activations of the rows where they are known, (K, N + 1): of rows that do not follow each other."""
+
+    def activations(self) -> Floats:
+        """Return the activations along the rows once, without noise, (K, N + 1)."""
+        return activations(self.basis, self.position) if self.known is None else self.known
 
     def cycles(self) -> Iterator[Taught]:
         """Give cycle after cycle of `CYCLE` samples, without end."""
@@ -109,10 +117,13 @@ class Lesson:
         while True:
             for start in range(0, rows.size, CYCLE * _CHUNK):
                 part = rows[start : start + CYCLE * _CHUNK]
-                u = self.position[part]
-                if self.position_noise:
-                    u = u + self.position_noise * self._noise(chance, u.size)
-                x = activations(self.basis, u, state, held)
+                if self.known is not None:
+                    x = self.known[part]
+                else:
+                    u = self.position[part]
+                    if self.position_noise:
+                        u = u + self.position_noise * self._noise(chance, u.size)
+                    x = activations(self.basis, u, state, held)
                 force = self.force[part]
                 if self.force_noise:
                     force = force + self.force_noise * chance.uniform(-1, 1, force.size)
@@ -142,7 +153,7 @@ class Trained:
 
 def lms_gain(lesson: Lesson, step: float) -> float:
     """Return the learning factor of (8), `step` over the mean squared norm of the clean activations (1/m^2)."""
-    x = activations(lesson.basis, lesson.position)
+    x = lesson.activations()
     return step / float(np.mean(np.sum(x**2, axis=1)))
 
 

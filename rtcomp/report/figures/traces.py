@@ -26,7 +26,8 @@ def traces_figure(
     """Return curves, each (name, x, y, role) with x and y of one length, which need not rise along x.
 
     `x` and `y` name the axes: title and unit. The first curve is drawn broad and pale, so that the next stays
-    visible where they agree. A `role` of the palette fixes a curve's colour. NaN breaks a line. Raises ValueError
+    visible where they agree. A `role` of the palette fixes a curve's colour. NaN breaks a line. Raises
+    ValueError
     where lengths differ.
     """
     xs, ys = [c.floats(k[1]) for k in curves], [c.floats(k[2]) for k in curves]
