@@ -40,8 +40,8 @@ def paper(
 
     \b
     Examples:
-      rtcomp paper --quick --out out/paper
-      rtcomp paper yaw.csv.gz --out out/paper-yaw
+      rtcomp paper --out out/paper
+      rtcomp paper yaw.csv.gz --quick --out out/paper-yaw
     """
     from rtcomp.jobs.configuration import Configuration
     from rtcomp.jobs.demo import shipped

@@ -22,7 +22,7 @@ def number(value: float) -> str:
 
 
 def spread(value: Spread, unit: str) -> str:
-    """Return ``1.56 times (0.857 to never)``, median and range over the seeds; without it where there is none."""
+    """Return ``1.56 times (0.857 to never)``, median and range over the seeds, if any."""
     middle = f"{number(value.median)} {unit}" if math.isfinite(value.median) else "never reached"
     if value.low == value.high:
         return middle
@@ -35,7 +35,7 @@ def verdict(claim: Claim) -> str:
 
 
 def claim_rows(done: Study) -> list[tuple[str, str, str, str, bool]]:
-    """Return the claims for the terminal: name, what the paper says, the number, what it is, whether it holds."""
+    """Return the claims for the terminal: name, the paper, number, what it is, whether it holds."""
     return [(c.name, c.paper, spread(c.value, c.unit), c.quantity, c.holds) for c in done.claims]
 
 
@@ -44,8 +44,7 @@ def paper_page(done: Study) -> Page:
     true = sum(c.holds for c in done.claims)
     setup = (
         f"the recording {done.recording} stands in for the real setup in Figs. 10 to 12; Figs. 13b, 14b and "
-        "15 need a "
-        "closed loop and are simulated"
+        "15 need a closed loop and are simulated"
         if done.recording
         else "the real setup is a simulated stage with flaws of the size of Fig. 11"
     )
@@ -59,13 +58,10 @@ def paper_page(done: Study) -> Page:
         ],
         notes=[
             f"The paper gives no learning factor. Step {done.step:g} (over the mean squared norm of the "
-            "activations) "
-            "needs about its 60 cycles in the ideal case and is taken everywhere; the fastest, "
-            f"{done.fastest:g}, is "
-            "beside it where it matters.",
+            "activations) needs about its 60 cycles in the ideal case and is taken everywhere; the "
+            f"fastest, {done.fastest:g}, is beside it where it matters.",
             f"Median and range over {done.effort.seeds} seeds ({done.effort.loops} in closed loop); never: "
-            "not within "
-            f"{done.effort.most} cycles.",
+            f"not within {done.effort.most} cycles.",
         ],
         sections=[
             Section("The claims", "", None, _claims(done)),

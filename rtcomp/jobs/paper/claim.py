@@ -40,7 +40,7 @@ def ratio(after: float, before: float) -> float:
 
 
 def cycles_until(errors: Sequence[float], level: float, stay: int) -> float:
-    """Return the first cycle (counted from 1) of `stay` in a row with errors at most `level`; else infinity."""
+    """Return the first cycle (from 1) of `stay` in a row with errors at most `level`; else infinity."""
     run = 0
     for number, error in enumerate(errors, 1):
         run = run + 1 if error <= level else 0

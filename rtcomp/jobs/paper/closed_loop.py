@@ -56,7 +56,7 @@ def _house(flaws: tuple[float, float], kind: str, intervals: int) -> HysteresisM
 
 
 def house_model(config: Configuration, kind: str, intervals: int) -> HysteresisModel:
-    """Return what `rtcomp identify` makes of the rig with `intervals` of the model `kind`, equal at the start."""
+    """Return what `rtcomp identify` makes of the rig: `intervals` of model `kind`, equal at first."""
     section = {**config.file.data["identify"], "model": kind, "intervals": intervals, "spacing": 1.0}
     reference = {"kind": "triangle", "amplitude": 7e-5, "frequency": 1.0, "duration": 10.0}
     return identify(config.changed(identify=section, reference=reference, judge={})).model
@@ -95,9 +95,7 @@ def bumps_of(reference: Floats, error: Floats, steep: float) -> Bumps:
     """
     way = since_reversal(reference)
     turns = np.flatnonzero(np.diff(way) < 0.0) + 1
-    peaks = [
-        low + int(np.argmax(np.abs(error[low:high]))) for low, high in itertools.pairwise(turns)
-    ]
+    peaks = [low + int(np.argmax(np.abs(error[low:high]))) for low, high in itertools.pairwise(turns)]
     rows = way[turns[0] : turns[-1]] if turns.size > 1 else way
     return Bumps(way[peaks], np.abs(error[peaks]), float(np.mean(rows <= steep)))
 
@@ -122,9 +120,9 @@ def compensation(effort: Effort, step: float, fastest: float) -> list[Claim]:
     steep = steep_way(rig())
     found = [_bumps(done, steep) for done in real]
     where = (
-        f"compensation in closed loop, simulated Leuven stage, 20 equal intervals trained {TAUGHT} cycles "
-        "on the main "
-        f"loop by LMS (8) with step {step:g}, sines of 55 to 70 um at 0.8 to 1.2 Hz, {effort.loops} seeds"
+        f"compensation in closed loop, simulated Leuven stage, 20 equal intervals trained {TAUGHT} cycles on "
+        f"the main loop by LMS (8) with step {step:g}, sines of 55 to 70 um at 0.8 to 1.2 Hz, {effort.loops} "
+        "seeds"
     )
     flawed = f"{where}; asymmetry {ASYMMETRY:g} and softening {SOFTENING:g} in the simulated friction"
     gain = Spread.of([d.improvement for d in ideal])
@@ -145,45 +143,59 @@ def compensation(effort: Effort, step: float, fastest: float) -> list[Claim]:
     lost = [ratio(i.improvement, r.improvement) for i, r in zip(ideal, real, strict=True)]
     return [
         Claim(
-            "compensation-ideal", "in the simulation the compensation was extraordinarily good",
-            gain.median >= 10.0, gain, "rms tracking error without over with", "times",
-            "median at least 10", where,
+            "compensation-ideal",
+            "in the simulation the compensation was extraordinarily good",
+            gain.median >= 10.0,
+            gain,
+            "rms tracking error without over with",
+            "times",
+            "median at least 10",
+            where,
             f"What limits it is how far training has come: with the fastest step, {fastest:g}, it is "
             f"{Spread.of(at_pace).median:.0f} times; with RLS {Spread.of(rls).median:.0f}.",
-            {f"improvement_step_{fastest:g}": Spread.of(at_pace).median,
-             "improvement_rls": Spread.of(rls).median,
-             "peak_with_um": Spread.of([1e6 * d.error_with.peak for d in ideal]).median,
-             "peak_without_um": Spread.of([1e6 * d.error_without.peak for d in ideal]).median},
+            {
+                f"improvement_step_{fastest:g}": Spread.of(at_pace).median,
+                "improvement_rls": Spread.of(rls).median,
+                "peak_with_um": Spread.of([1e6 * d.error_with.peak for d in ideal]).median,
+                "peak_without_um": Spread.of([1e6 * d.error_without.peak for d in ideal]).median,
+            },
         ),
         Claim(
-            "bumps-of-5-um", "in the real setup the approximation errors cause visible bumps of about 5 um",
-            2.5 <= peak.median <= 10.0, peak, "largest error with compensation", "um",
-            "median between 2.5 and 10 um", flawed,
+            "bumps-of-5-um",
+            "in the real setup the approximation errors cause visible bumps of about 5 um",
+            2.5 <= peak.median <= 10.0,
+            peak,
+            "largest error with compensation",
+            "um",
+            "median between 2.5 and 10 um",
+            flawed,
             "The size depends on the gain of the controller, which the paper does not give; here it is a "
             "PID.",
-            {"peak_without_um": Spread.of([1e6 * d.error_without.peak for d in real]).median,
-             "improvement": Spread.of([d.improvement for d in real]).median,
-             "improvement_ideal_over_real": Spread.of(lost).median},
+            {
+                "peak_without_um": Spread.of([1e6 * d.error_without.peak for d in real]).median,
+                "improvement": Spread.of([d.improvement for d in real]).median,
+                "improvement_ideal_over_real": Spread.of(lost).median,
+            },
         ),
         Claim(
-            "bumps-at-the-steepest", "the bumps appear where the model does not fit the steepest parts of the branches",
-            on_steep.median > 50.0 and on_steep.median > chance, on_steep,
-            "half cycles whose largest error lies on the steepest part", "%",
+            "bumps-at-the-steepest",
+            "the bumps appear where the model does not fit the steepest parts of the branches",
+            on_steep.median > 50.0 and on_steep.median > chance,
+            on_steep,
+            "half cycles whose largest error lies on the steepest part",
+            "%",
             "median above 50 %, and above what peaks at random would hit; steepest: at least half as steep "
-            "as right "
-            "after the reversal",
+            "as right after the reversal",
             flawed,
             f"At random it would be {chance:.0f} %; the steepest part ends {1e6 * steep:.0f} um after the "
             f"reversal, the peaks come {after:.0f} um after it. Slow training leaves its error where the "
-            "last "
-            "intervals end, asymmetry leaves a broad one. Trained with the fastest step and without the "
-            "flaws it "
-            f"is {others[f'steep_percent_ideal_step_{fastest:g}']:.0f} %, "
+            "last intervals end, asymmetry leaves a broad one. Trained with the fastest step and without "
+            f"the flaws it is {others[f'steep_percent_ideal_step_{fastest:g}']:.0f} %, "
             f"{others[f'peaks_after_um_ideal_step_{fastest:g}']:.0f} um after the reversal.",
             {"at_random_percent": chance, "steep_until_um": 1e6 * steep, "peaks_after_um": after, **others},
         ),
         placing(effort),
-    ]  # fmt: skip
+    ]
 
 
 def placing(effort: Effort) -> Claim:
@@ -211,12 +223,16 @@ def placing(effort: Effort) -> Claim:
     ]
     numbers["ratio_without_flaws"] = Spread.of([ratio(a, b) for a, b in zip(*plain, strict=True)]).median
     return Claim(
-        "placing-helps", "an algorithm that optimises the interval setup would be the best way to deal with the bumps",
-        found.median > 1.25, found, f"largest error, {FEW} equal intervals over {FEW} that place themselves", "times",
+        "placing-helps",
+        "an algorithm that optimises the interval setup would be the best way to deal with the bumps",
+        found.median > 1.25,
+        found,
+        f"largest error, {FEW} equal intervals over {FEW} that place themselves",
+        "times",
         "median above 1.25",
         f"as above with RLS, `identify.model` interval and self-placing, 10 s of a triangle; {effort.loops} "
         "seeds",
         f"With 20 intervals it is {Spread.of(ratios[20]).median:.2g} times. Without the flaws it is "
         f"{numbers['ratio_without_flaws']:.2g} with {FEW}: places do not mend asymmetry.",
         numbers,
-    )  # fmt: skip
+    )

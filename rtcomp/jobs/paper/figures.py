@@ -20,7 +20,10 @@ from rtcomp.kernels import Floats
 
 SHOWN_S = (3.0, 5.5)
 """Part of a run in closed loop that is drawn."""
-STAND_IN = f"simulated stage with asymmetry {ASYMMETRY:g} and softening {SOFTENING:g}, in the place of the real setup"
+STAND_IN = (
+    f"simulated stage with asymmetry {ASYMMETRY:g} and softening {SOFTENING:g}, in the place of the real "
+    "setup"
+)
 
 
 class Trace(NamedTuple):
@@ -52,17 +55,29 @@ class Remade:
     def to_json(self) -> dict[str, Any]:
         """Return the figure as paper.json lists it, without its curves."""
         return {
-            "figure": self.number, "title": self.title, "paper": self.paper, "here": self.here,
-            "source": self.source, "numbers": self.numbers,
-        }  # fmt: skip
+            "figure": self.number,
+            "title": self.title,
+            "paper": self.paper,
+            "here": self.here,
+            "source": self.source,
+            "numbers": self.numbers,
+        }
 
 
 def _percent(value: float) -> str:
     return f"{100 * value:.2g} %"
 
 
-def identified(number: str, title: str, paper: str, lesson: Lesson, exam: Exam, step: float, source: str,
-               cycles: int = 60) -> Remade:  # fmt: skip
+def identified(
+    number: str,
+    title: str,
+    paper: str,
+    lesson: Lesson,
+    exam: Exam,
+    step: float,
+    source: str,
+    cycles: int = 60,
+) -> Remade:
     """Return a loop and the model trained on it for as many cycles as the paper needed."""
     done = train(lesson, exam, step, cycles, whole=True)
     said = lesson.activations() @ done.weights
@@ -77,21 +92,28 @@ def identified(number: str, title: str, paper: str, lesson: Lesson, exam: Exam, 
     ]
     error = float(done.errors[-1])
     return Remade(
-        number, title, paper, f"After {cycles} cycles the frozen model is off by {_percent(error)} of the peak.",
-        f"{source}; {lesson.basis.size} equal intervals, LMS (8) with step {step:g}", traces,
+        number,
+        title,
+        paper,
+        f"After {cycles} cycles the frozen model is off by {_percent(error)} of the peak.",
+        f"{source}; {lesson.basis.size} equal intervals, LMS (8) with step {step:g}",
+        traces,
         numbers={"error": error, "cycles": float(cycles)},
-    )  # fmt: skip
+    )
 
 
 def symmetry(position: Floats, force: Floats, source: str) -> Remade:
     """Return Fig. 11a: one cycle of the main loop, and turned half round."""
     x, y, far = mirrored(position, force)
     return Remade(
-        "11a", "Symmetry test", "the measured loop and its mirrored counterpart do not quite overlap (no number)",
-        f"They lie at most {_percent(far)} of half the loop's height apart.", source,
+        "11a",
+        "Symmetry test",
+        "the measured loop and its mirrored counterpart do not quite overlap (no number)",
+        f"They lie at most {_percent(far)} of half the loop's height apart.",
+        source,
         [Trace("main loop", position, force, "measured"), Trace("mirrored", x, y, "model")],
         numbers={"asymmetry": far},
-    )  # fmt: skip
+    )
 
 
 def congruency(found: Sequence[tuple[Floats, Floats]], source: str) -> Remade:
@@ -109,10 +131,16 @@ def congruency(found: Sequence[tuple[Floats, Floats]], source: str) -> Remade:
     if small:
         traces.append(Trace("minor loops", joined(small, 0), joined(small, 1), "model"))
     return Remade(
-        "11b", "Congruency test", "the branches of major and minor loops do not quite coincide (no number)",
-        f"{len(found)} branches; they lie at most {_percent(far)} of the highest apart.", source, traces,
-        ("Way since the reversal", "m"), ("Force since the reversal", "N"), {"incongruency": far},
-    )  # fmt: skip
+        "11b",
+        "Congruency test",
+        "the branches of major and minor loops do not quite coincide (no number)",
+        f"{len(found)} branches; they lie at most {_percent(far)} of the highest apart.",
+        source,
+        traces,
+        ("Way since the reversal", "m"),
+        ("Force since the reversal", "N"),
+        {"incongruency": far},
+    )
 
 
 def on_minor(
@@ -125,14 +153,18 @@ def on_minor(
     last = slice(-4 * CYCLE, None)
     on_main, on_small = lessons.on_main.error(weights), lessons.on_minor.error(weights)
     return Remade(
-        number, title, paper,
+        number,
+        title,
+        paper,
         f"Frozen, it is off by {_percent(on_small)} on other minor loops and {_percent(on_main)} on the "
         "main loop.",
         f"{source}; LMS (8) with step {step:g}, {TAUGHT} cycles",
-        [Trace("measured", shown.position[last], shown.force[last], "measured"),
-         Trace("model", shown.position[last], said[last], "model")],
+        [
+            Trace("measured", shown.position[last], shown.force[last], "measured"),
+            Trace("model", shown.position[last], said[last], "model"),
+        ],
         numbers={"error_main": on_main, "error_minor": on_small},
-    )  # fmt: skip
+    )
 
 
 def _tracked(
@@ -150,10 +182,16 @@ def _tracked(
     if compensated:
         traces.append(Trace("error, 10 times", c["time"][rows], 10.0 * (desired - actual), "model"))
     return Remade(
-        number, title, paper,
-        f"The tracking error is {1e6 * size.rms:.2g} um rms, {1e6 * size.peak:.2g} um at most.", source,
-        traces, ("Time", "s"), ("Position", "m"), {"error_rms_um": 1e6 * size.rms, "error_peak_um": 1e6 * size.peak},
-    )  # fmt: skip
+        number,
+        title,
+        paper,
+        f"The tracking error is {1e6 * size.rms:.2g} um rms, {1e6 * size.peak:.2g} um at most.",
+        source,
+        traces,
+        ("Time", "s"),
+        ("Position", "m"),
+        {"error_rms_um": 1e6 * size.rms, "error_peak_um": 1e6 * size.peak},
+    )
 
 
 def figures(step: float, measured: Measured | None = None) -> list[Remade]:
@@ -162,16 +200,33 @@ def figures(step: float, measured: Measured | None = None) -> list[Remade]:
     noisy = replace(plain.lesson, position_noise=NOISE * float(np.ptp(plain.lesson.position)))
     ideal = "simulated Leuven stage"
     found = [
-        identified("9a", "Simulation, ideal case", f"converged to {_percent(LEVEL)} in about 60 cycles", plain.lesson,
-                   plain.held_out, step, ideal),
-        identified("9b", "Simulation, with measurement noise", "no noticeable difference with about 5 % of noise",
-                   noisy, plain.held_out, step, f"{ideal}, uniform position noise of 5 %"),
+        identified(
+            "9a",
+            "Simulation, ideal case",
+            f"converged to {_percent(LEVEL)} in about 60 cycles",
+            plain.lesson,
+            plain.held_out,
+            step,
+            ideal,
+        ),
+        identified(
+            "9b",
+            "Simulation, with measurement noise",
+            "no noticeable difference with about 5 % of noise",
+            noisy,
+            plain.held_out,
+            step,
+            f"{ideal}, uniform position noise of 5 %",
+        ),
         *_of_setup(step, measured),
-    ]  # fmt: skip
+    ]
     sine: dict[str, float | str] = {"kind": "sine", "amplitude": 6e-5, "frequency": 1.0, "duration": 6.0}
     small: dict[str, Any] = {
-        "kind": "multisine", "frequencies": [0.5, 2.0], "amplitudes": [2.5e-5, 1.5e-5], "duration": 6.0,
-    }  # fmt: skip
+        "kind": "multisine",
+        "frequencies": [0.5, 2.0],
+        "amplitudes": [2.5e-5, 1.5e-5],
+        "duration": 6.0,
+    }
     learner = f"20 equal intervals, LMS (8) with step {step:g}"
     a = followed(rig(), papers_model((0.0, 0.0), step, 0), sine)
     b = followed(rig(*FLAWED), papers_model(FLAWED, step, 0), sine)
@@ -182,10 +237,16 @@ def figures(step: float, measured: Measured | None = None) -> list[Remade]:
         *found,
         _tracked("13a", "Simulation, without compensation", none, a, False, ideal),
         _tracked("13b", "Real setup, without compensation", none, b, False, STAND_IN),
-        _tracked("14a", "Simulation, with compensation", "extraordinarily good", a, True, f"{ideal}; {learner}"),
-        _tracked("14b", "Real setup, with compensation, major loop", "visible bumps of about 5 um", b, True, flawed),
-        _tracked("15", "Compensation in minor loops", "bumps as in Fig. 14b (no number)", minor, True, flawed),
-    ]  # fmt: skip
+        _tracked(
+            "14a", "Simulation, with compensation", "extraordinarily good", a, True, f"{ideal}; {learner}"
+        ),
+        _tracked(
+            "14b", "Real setup, with compensation, major loop", "visible bumps of about 5 um", b, True, flawed
+        ),
+        _tracked(
+            "15", "Compensation in minor loops", "bumps as in Fig. 14b (no number)", minor, True, flawed
+        ),
+    ]
 
 
 def _of_setup(step: float, measured: Measured | None) -> list[Remade]:
@@ -206,15 +267,36 @@ def _of_setup(step: float, measured: Measured | None) -> list[Remade]:
         several = [branch for pair in pairs for branch in to_and_back(*pair)]
         first, judged = lessons.main, lessons.on_main
     found = [
-        identified("10", "Real setup, main loop", "much slower than in the simulation (no number)", first, judged,
-                   step, source),
+        identified(
+            "10",
+            "Real setup, main loop",
+            "much slower than in the simulation (no number)",
+            first,
+            judged,
+            step,
+            source,
+        ),
         symmetry(*cycle, source),
         congruency(several, source),
-        on_minor("12a", "Minor loops, trained on the main loop only", "smooth, with a large error on minor loops",
-                 lessons, step, False, source),
-        on_minor("12b", "Minor loops, trained on minor loops too",
-                 "better on minor loops, a little worse on the main loop", lessons, step, True, source),
-    ]  # fmt: skip
+        on_minor(
+            "12a",
+            "Minor loops, trained on the main loop only",
+            "smooth, with a large error on minor loops",
+            lessons,
+            step,
+            False,
+            source,
+        ),
+        on_minor(
+            "12b",
+            "Minor loops, trained on minor loops too",
+            "better on minor loops, a little worse on the main loop",
+            lessons,
+            step,
+            True,
+            source,
+        ),
+    ]
     if measured is not None and measured.axis == "rotary":
         rotary = {"m": "rad", "N": "N m"}
         found = [replace(f, x=(f.x[0], rotary[f.x[1]]), y=(f.y[0], rotary[f.y[1]])) for f in found]

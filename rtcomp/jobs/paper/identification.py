@@ -27,7 +27,10 @@ from rtcomp.jobs.paper.shape import apart, branches, mirrored
 from rtcomp.jobs.paper.training import Exam, Lesson, Trained, train, train_rls
 
 STEPS = (0.003, 0.005, 0.01, 0.03, 0.1, 0.3, 1.0)
-"""Learning factors of (8) that are tried, over the mean squared norm of the activations; the paper gives none."""
+"""Learning factors of (8) that are tried, over the mean squared norm of the activations.
+
+The paper gives none.
+"""
 PAPER_CYCLES = 60.0
 NOISE = 0.05
 """Of Fig. 9b: amplitude of the position noise over the largest difference of positions."""
@@ -86,12 +89,12 @@ def cycles(
     output: float = 0.0,
     every: int = 1,
 ) -> list[float]:
-    """Return, for each seed, the cycles that (8) takes to the paper's 5 % on other motion, infinity for never.
+    """Return, for each seed, the cycles that (8) takes to 5 % on other motion, infinity for never.
 
     flaws: asymmetry and softening of the rig (1). own: judged on the clean loop learned from instead.
     position, output: noise, over the largest difference of positions and the peak force. every: rows between
     two draws of the position noise.
-    """  # fmt: skip
+    """
     return [
         _one(case(*flaws, seed), effort, step, own, position, output, every).cycles
         for seed in range(effort.seeds)
@@ -138,9 +141,8 @@ def matched_step(effort: Effort) -> tuple[float, dict[float, float]]:
 def _where(effort: Effort, step: float) -> str:
     return (
         f"simulated Leuven stage, 20 equal intervals, LMS (8) with step {step:g} of the mean squared norm, "
-        "cycles of "
-        f"1000 samples of the main loop, frozen weights on other motion, {effort.seeds} seeds, at most "
-        f"{effort.most} cycles"
+        f"cycles of 1000 samples of the main loop, frozen weights on other motion, {effort.seeds} seeds, at "
+        f"most {effort.most} cycles"
     )
 
 
@@ -148,15 +150,21 @@ def convergence(effort: Effort, step: float, table: dict[float, float]) -> Claim
     """Test "about 60 training cycles with 1000 samples per cycle for an error limit of 5 %"."""
     found = Spread.of(cycles(effort, step))
     return Claim(
-        "convergence", "about 60 training cycles of 1000 samples to an error of 5 %",
-        30.0 <= found.median <= 120.0, found, "cycles to stay below 5 %", "cycles",
+        "convergence",
+        "about 60 training cycles of 1000 samples to an error of 5 %",
+        30.0 <= found.median <= 120.0,
+        found,
+        "cycles to stay below 5 %",
+        "cycles",
         "median between 30 and 120 at the step that comes nearest to 60",
         _where(effort, step),
         f"The paper gives no learning factor. The fastest step, {min(table, key=lambda s: table[s]):g}, "
-        "needs "
-        f"{min(table.values()):g}; RLS {Spread.of(_rls(effort)).median:g}.",
-        {**{f"cycles_at_step_{s:g}": n for s, n in table.items()}, "rls_cycles": Spread.of(_rls(effort)).median},
-    )  # fmt: skip
+        f"needs {min(table.values()):g}; RLS {Spread.of(_rls(effort)).median:g}.",
+        {
+            **{f"cycles_at_step_{s:g}": n for s, n in table.items()},
+            "rls_cycles": Spread.of(_rls(effort)).median,
+        },
+    )
 
 
 def noise(effort: Effort, step: float) -> Claim:
@@ -182,20 +190,22 @@ def noise(effort: Effort, step: float) -> Claim:
     unseen = [n for n in WEAKER if beside[f"cycles_ratio_noise_{100 * n:g}_percent"] <= NOTICEABLE]
     up_to = f"up to {100 * max(unseen):g} % of noise" if unseen else "of none of the weaker noises tried"
     return Claim(
-        "noise", "noise of 5 % of the largest difference, added to the position, made no noticeable difference",
-        found.median <= NOTICEABLE, found, "cycles with noise over cycles without", "times",
-        "median at most 1.25", _where(effort, step) + "; noise uniform, new for every sample",
+        "noise",
+        "noise of 5 % of the largest difference, added to the position, made no noticeable difference",
+        found.median <= NOTICEABLE,
+        found,
+        "cycles with noise over cycles without",
+        "times",
+        "median at most 1.25",
+        _where(effort, step) + "; noise uniform, new for every sample",
         "Noise that is new at every sample turns the operator back at every sample and flattens the first "
-        "weights: "
-        f"{100 * beside['error_after_100_cycles']:.0f} % stay after 100 cycles. One does not notice it "
-        f"{up_to}, nor "
-        f"in the force (ratio {_times(beside['cycles_ratio_force_noise_5_percent'])}). With slow noise, "
-        "drawn "
-        f"{CYCLE // SLOW} times a cycle, "
+        f"weights: {100 * beside['error_after_100_cycles']:.0f} % stay after 100 cycles. One does not notice "
+        f"it {up_to}, nor in the force (ratio {_times(beside['cycles_ratio_force_noise_5_percent'])}). With "
+        f"slow noise, drawn {CYCLE // SLOW} times a cycle, "
         + ("5 % is not reached either" if math.isinf(slow) else f"the ratio is {slow:.2g}")
         + ". The paper may have judged by eye, on the noisy loop.",
         beside,
-    )  # fmt: skip
+    )
 
 
 def slowed(effort: Effort, step: float, fastest: float) -> list[Claim]:
@@ -204,10 +214,12 @@ def slowed(effort: Effort, step: float, fastest: float) -> list[Claim]:
     size = {
         "asymmetry-slows": ((ASYMMETRY, 0.0), "asymmetry", f"asymmetric-friction, asymmetry {ASYMMETRY:g}"),
         "non-congruence-slows": (
-            (0.0, SOFTENING), "lost congruency", f"non-congruent-friction, softening {SOFTENING:g}"
+            (0.0, SOFTENING),
+            "lost congruency",
+            f"non-congruent-friction, softening {SOFTENING:g}",
         ),
         "both-slow": ((ASYMMETRY, SOFTENING), "both", "both effects"),
-    }  # fmt: skip
+    }
     straight, own_straight = cycles(effort, step), cycles(effort, step, own=True)
     for name, (flaws, what, effect) in size.items():
         bent = cycles(effort, step, flaws)
@@ -235,9 +247,14 @@ def slowed(effort: Effort, step: float, fastest: float) -> list[Claim]:
         on_loop = beside["cycles_ratio_on_the_loop_learned_from"]
         claims.append(
             Claim(
-                name, f"{what} of about the size of Fig. 11 slows the training",
-                found.median > NOTICEABLE, found, "cycles with it over cycles without", "times",
-                "median above 1.25", f"{_where(effort, step)}; {effect} in the simulated stage; loop and "
+                name,
+                f"{what} of about the size of Fig. 11 slows the training",
+                found.median > NOTICEABLE,
+                found,
+                "cycles with it over cycles without",
+                "times",
+                "median above 1.25",
+                f"{_where(effort, step)}; {effect} in the simulated stage; loop and "
                 f"mirrored loop at most {100 * far:.0f} % of half the height apart, branches at most "
                 f"{100 * unlike:.0f} % of the highest",
                 f"5 % was not reached in {missed} of {effort.seeds}. On the loop learned from, the ratio is "
@@ -245,7 +262,7 @@ def slowed(effort: Effort, step: float, fastest: float) -> list[Claim]:
                 + ("also speed." if on_loop > NOTICEABLE else "how well it carries over, not speed."),
                 beside,
             )
-        )  # fmt: skip
+        )
     return claims
 
 
@@ -253,8 +270,14 @@ def _times(value: float) -> str:
     return f"{value:.2g}" if math.isfinite(value) else "never"
 
 
-def output_noise(effort: Effort, step: float, *, given: Callable[[float, bool, int], float] | None = None,
-                 suffix: str = "", where: str = "") -> Claim:  # fmt: skip
+def output_noise(
+    effort: Effort,
+    step: float,
+    *,
+    given: Callable[[float, bool, int], float] | None = None,
+    suffix: str = "",
+    where: str = "",
+) -> Claim:
     """Test "additional output noise made the training faster" on asymmetric data, over several levels.
 
     given: another lesson than the rig's: cycles by noise level (over the peak), whether judged on the loop
@@ -282,19 +305,22 @@ def output_noise(effort: Effort, step: float, *, given: Callable[[float, bool, i
     judged = "the loop learned from" if best[0] else "other motion"
     faster = tried[best].median < 0.9
     return Claim(
-        f"output-noise-speeds{suffix}", "additional output noise makes training on asymmetric data faster",
-        faster, tried[best], "cycles with noise over cycles without, at the best level", "times",
+        f"output-noise-speeds{suffix}",
+        "additional output noise makes training on asymmetric data faster",
+        faster,
+        tried[best],
+        "cycles with noise over cycles without, at the best level",
+        "times",
         "median below 0.9 at one of the levels 2, 5, 10, 20, 50 % of the peak, on the loop learned from or "
-        "on other "
-        "motion",
+        "on other motion",
         where or f"{_where(effort, step)}; asymmetric-friction, asymmetry {ASYMMETRY:g}; noise uniform",
         f"Best: {100 * best[1]:g} % on {judged}. "
         + (
             "Chosen as the best of ten."
             if faster
-            else "Rule (8) is linear in the force: noise of mean zero leaves the mean path of the weights as it is "
-            "and adds only their scatter. A learner that stops in a flat place of its error might gain."
+            else "Rule (8) is linear in the force: noise of mean zero leaves the mean path of the weights as "
+            "it is and adds only their scatter. A learner that stops in a flat place of its error might gain."
         )
         + (" Without noise other motion is never judged below 5 %." if never[False] else ""),
         beside,
-    )  # fmt: skip
+    )

@@ -23,7 +23,7 @@ DISTURBED = 60
 
 
 def changed(basis: Basis, loop: Lesson, exam: Exam, zone: tuple[float, float], step: float) -> Floats:
-    """Return by what force (N, (N,)) a local disturbance of the loop in `zone` (m after reversals) moves each weight.
+    """Return by what force (N, (N,)) a disturbance in `zone` (m after reversals) moves each weight.
 
     It is trained with and without the disturbance and the two are compared. As (8) is linear, that is the
     same
@@ -40,7 +40,7 @@ def changed(basis: Basis, loop: Lesson, exam: Exam, zone: tuple[float, float], s
 
 
 def locality(effort: Effort, step: float, fastest: float) -> list[Claim]:
-    """Test that (8) moves few weights of the interval basis and all of the stop basis: in a step, and in the end."""
+    """Test that (8) moves few interval weights and all stop weights: in a step, and in the end."""
     shown = moved(rig(), main_loop(5))
     bases: dict[str, Basis] = {
         "interval": IntervalBasis.over(INTERVALS, RANGE_M),
@@ -68,28 +68,31 @@ def locality(effort: Effort, step: float, fastest: float) -> list[Claim]:
     one = touched["interval"]
     return [
         Claim(
-            "local-updates", "a step of training changes all weights of the stop model, of the interval model not",
-            one.median < 0.8 <= touched["stop"].median, Spread(*(100 * v for v in one)),
-            "interval weights that one sample moves (over the samples of a cycle)", "%",
+            "local-updates",
+            "a step of training changes all weights of the stop model, of the interval model not",
+            one.median < 0.8 <= touched["stop"].median,
+            Spread(*(100 * v for v in one)),
+            "interval weights that one sample moves (over the samples of a cycle)",
+            "%",
             "median below 80 %, and of the stop basis above",
             "simulated Leuven stage, 20 elements each, (8) on every sample of a cycle of the main loop",
             f"Of the stop weights it is {100 * touched['stop'].median:.0f} %. An interval already filled "
-            "has its whole "
-            "width for x_i and is moved as well, wherever the error came from.",
+            "has its whole width for x_i and is moved as well, wherever the error came from.",
             {"moved_percent_stop": 100 * touched["stop"].median},
         ),
         Claim(
-            "local-errors", "local errors in the training data appear localized in the trained model",
-            found.median < 0.8, found, "share of weights that take part, interval over stop basis", "times",
+            "local-errors",
+            "local errors in the training data appear localized in the trained model",
+            found.median < 0.8,
+            found,
+            "share of weights that take part, interval over stop basis",
+            "times",
             "median below 0.8; share (sum |c|)^2 / (N sum c^2) of the changes c in force",
             f"simulated Leuven stage, 20 elements each, LMS (8) with step {step:g}, {DISTURBED} cycles with "
-            "the force "
-            f"off by {100 * WRONG:g} % of the peak along a tenth of the range after each reversal, against "
-            "as many "
-            f"without; {effort.seeds} places",
-            f"With the fastest step, {fastest:g}, it is {soon.median:.2g}: an error begins spread over "
-            "every filled "
-            "interval and gathers in its place as training goes on."
+            f"the force off by {100 * WRONG:g} % of the peak along a tenth of the range after each "
+            f"reversal, against as many without; {effort.seeds} places",
+            f"With the fastest step, {fastest:g}, it is {soon.median:.2g}: an error begins spread over every "
+            "filled interval and gathers in its place as training goes on."
             if soon.median < found.median
             else "",
             {
@@ -98,4 +101,4 @@ def locality(effort: Effort, step: float, fastest: float) -> list[Claim]:
                 f"ratio_step_{fastest:g}": soon.median,
             },
         ),
-    ]  # fmt: skip
+    ]

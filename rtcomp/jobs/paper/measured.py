@@ -56,9 +56,14 @@ def cut(config: Configuration, recording: Recording) -> Measured:
     """
     smoothing = config.run.identify.smoothing if config.run.identify is not None else 0.0
     shown = friction_of(
-        config.stage, recording.time, recording.position, recording.voltage, config.run.recording.delay_ticks,
-        smoothing, ~recording.trusted,
-    )  # fmt: skip
+        config.stage,
+        recording.time,
+        recording.position,
+        recording.voltage,
+        config.run.recording.delay_ticks,
+        smoothing,
+        ~recording.trusted,
+    )
     position = shown.position
     turns = turning_points(position, TURN * float(np.ptp(position)))
     lows = [int(t) for k, t in enumerate(turns) if position[t] < position[turns[k - 1 if k else 1]]]
@@ -67,8 +72,7 @@ def cut(config: Configuration, recording: Recording) -> Measured:
     if main is None:
         raise RecordingError(
             f"{recording.path}: no loop comes {LEAST_MAIN} times in a row within {100 * ALIKE:g} % of its "
-            "travel "
-            f"({travel.size} cycles were found); record the main loop at least {LEAST_MAIN} times"
+            f"travel ({travel.size} cycles were found); record the main loop at least {LEAST_MAIN} times"
         )
     size = float(np.median(travel[main.start : main.stop]))
     ends = list(itertools.pairwise(lows))
@@ -80,23 +84,21 @@ def cut(config: Configuration, recording: Recording) -> Measured:
     if len(minor) < LEAST_MINOR:
         raise RecordingError(
             f"{recording.path}: {len(minor)} closed loops are clearly smaller than the main one; at least "
-            f"{LEAST_MINOR} are "
-            "needed: record minor loops too"
+            f"{LEAST_MINOR} are needed: record minor loops too"
         )
-    rows = np.concatenate(
-        [np.linspace(a, b, CYCLE, endpoint=False) for a, b in itertools.pairwise(lows)]
-    )
+    rows = np.concatenate([np.linspace(a, b, CYCLE, endpoint=False) for a, b in itertools.pairwise(lows)])
     count = np.arange(position.size, dtype=np.float64)
     even = Friction(
-        np.interp(rows, count, shown.time), np.interp(rows, count, position), np.interp(rows, count,
-        shown.force),
+        np.interp(rows, count, shown.time),
+        np.interp(rows, count, position),
+        np.interp(rows, count, shown.force),
         np.interp(rows, count, shown.good.astype(np.float64)) > 0.5,
-    )  # fmt: skip
+    )
     return Measured(even, main, minor, config.stage.axis, recording.path.name)
 
 
 def closed(position: Floats, force: Floats) -> bool:
-    """Say whether a cycle ends where it began, within a tenth of its size both ways, and nowhere jumps by as much."""
+    """Say whether a cycle ends where it began, within a tenth of its size, and nowhere jumps by as much."""
     ends = [abs(a[-1] - a[0]) <= 0.1 * np.ptp(a) for a in (position, force)]
     return bool(all(ends) and np.abs(np.diff(force)).max() <= 0.1 * np.ptp(force))
 

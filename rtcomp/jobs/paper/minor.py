@@ -42,7 +42,7 @@ class Lessons:
 
 @dataclass(frozen=True)
 class Taught:
-    """Errors (1, over the peak force of what is judged on) of weights trained in either way, and the weights."""
+    """Errors (1, over the peak force judged on) of weights trained in either way, and the weights."""
 
     main_on_main: float
     main_on_minor: float
@@ -77,13 +77,17 @@ def taught(lessons: Lessons, step: float) -> Taught:
     main = train(lessons.main, lessons.on_main, step, TAUGHT, whole=True).weights
     both = train(lessons.both, lessons.on_main, step, TAUGHT, whole=True).weights
     return Taught(
-        lessons.on_main.error(main), lessons.on_minor.error(main),
-        lessons.on_main.error(both), lessons.on_minor.error(both), main, both,
-    )  # fmt: skip
+        lessons.on_main.error(main),
+        lessons.on_minor.error(main),
+        lessons.on_main.error(both),
+        lessons.on_minor.error(both),
+        main,
+        both,
+    )
 
 
 def roughness(weights: Floats) -> float:
-    """Return how often the slope of the virgin curve goes up and down: total variation over range, at least 1.
+    """Return how much the virgin curve's slope goes up and down: total variation over range, at least 1.
 
     1 where the weights (the bias, last, left out) only fall, or only rise.
     """
@@ -99,14 +103,13 @@ def minor_claims(
     suffix: str = "",
     where: str = "",
 ) -> list[Claim]:
-    """Test what section 3.2 says of training on the main loop and on both; `given` for other lessons by seed."""  # fmt: skip
+    """Test what section 3.2 says of training on main and minor loops; `given`: other lessons by seed."""
     make = given or (lambda seed: lessons_of(ASYMMETRY, SOFTENING, seed))
     done = [taught(make(seed), step) for seed in range(effort.seeds)]
     where = where or (
         f"simulated Leuven stage with asymmetry {ASYMMETRY:g} and softening {SOFTENING:g}, 20 equal "
-        "intervals, LMS "
-        f"(8) with step {step:g}, {TAUGHT} cycles of 1000 samples, frozen weights on loops of other sizes, "
-        f"{effort.seeds} seeds"
+        f"intervals, LMS (8) with step {step:g}, {TAUGHT} cycles of 1000 samples, half of them minor where "
+        f"both are taught, frozen weights on loops of other sizes, {effort.seeds} seeds"
     )
 
     def spread(values: Sequence[float]) -> Spread:
@@ -126,38 +129,71 @@ def minor_claims(
     says = (
         f"Errors, of the peak: main only {percent['error_main_on_main']:.2g} % on main and "
         f"{percent['error_main_on_minor']:.2g} % on minor loops; both {percent['error_both_on_main']:.2g} % "
-        "and "
-        f"{percent['error_both_on_minor']:.2g} %."
+        f"and {percent['error_both_on_minor']:.2g} %."
     )
     return [
         Claim(
-            f"main-only-spoils-minor{suffix}", "trained on the main loop only, the error on minor loops is large",
-            large.median > NOTICEABLE, large, "main only, error on minor loops over that on the main loop", "times",
-            "median above 1.25", where, says, errors,
+            f"main-only-spoils-minor{suffix}",
+            "trained on the main loop only, the error on minor loops is large",
+            large.median > NOTICEABLE,
+            large,
+            "main only, error on minor loops over that on the main loop",
+            "times",
+            "median above 1.25",
+            where,
+            says,
+            errors,
         ),
         Claim(
-            f"both-mend-minor{suffix}", "trained on minor loops too, these get better",
-            minor.median > NOTICEABLE, minor, "error on minor loops, main only over both", "times",
-            "median above 1.25", where,
-            says if minor.median > NOTICEABLE
-            else "They get better, by less than a quarter." if minor.median > 1.0
+            f"both-mend-minor{suffix}",
+            "trained on minor loops too, these get better",
+            minor.median > NOTICEABLE,
+            minor,
+            "error on minor loops, main only over both",
+            "times",
+            "median above 1.25",
+            where,
+            says
+            if minor.median > NOTICEABLE
+            else "They get better, by less than a quarter."
+            if minor.median > 1.0
             else "What is off there, minor loops do not teach this model either: no weights of it fit both.",
             errors,
         ),
         Claim(
-            f"both-spoil-main-a-little{suffix}", "trained on minor loops too, the main loop gets a little worse",
-            1.0 < major.median <= 2.0, major, "error on the main loop, both over main only", "times",
-            "median above 1 and at most 2", where, says, errors,
+            f"both-spoil-main-a-little{suffix}",
+            "trained on minor loops too, the main loop gets a little worse",
+            1.0 < major.median <= 2.0,
+            major,
+            "error on the main loop, both over main only",
+            "times",
+            "median above 1 and at most 2",
+            where,
+            says,
+            errors,
         ),
         Claim(
-            f"both-better-on-average{suffix}", "the average performance is better with minor loops than without",
-            mean.median < 1.0, mean, "mean error on main and minor loops, both over main only", "times",
-            "median below 1", where, says, errors,
+            f"both-better-on-average{suffix}",
+            "the average performance is better with minor loops than without",
+            mean.median < 1.0,
+            mean,
+            "mean error on main and minor loops, both over main only",
+            "times",
+            "median below 1",
+            where,
+            says,
+            errors,
         ),
         Claim(
-            f"main-only-smoother{suffix}", "trained on the main loop only, the estimated curve is smoother",
-            rough.median > 1.05, rough, "ups and downs of the weights, both over main only", "times",
-            "median above 1.05; total variation of the weights over their range", where,
-            "" if rough.median > 1.05 else "How smooth the curve in Fig. 12a is was judged by eye.", {},
+            f"main-only-smoother{suffix}",
+            "trained on the main loop only, the estimated curve is smoother",
+            rough.median > 1.05,
+            rough,
+            "ups and downs of the weights, both over main only",
+            "times",
+            "median above 1.05; total variation of the weights over their range",
+            where,
+            "" if rough.median > 1.05 else "How smooth the curve in Fig. 12a is was judged by eye.",
+            {},
         ),
-    ]  # fmt: skip
+    ]

@@ -1,4 +1,4 @@
-"""The simulated stage in the paper's place: ideal, or with the flaws that its real setup showed in Fig. 11."""
+"""The simulated stage in the paper's place: ideal, or with the flaws that Fig. 11 shows."""
 
 from __future__ import annotations
 

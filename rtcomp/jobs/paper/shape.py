@@ -82,7 +82,7 @@ def to_and_back(position: Floats, force: Floats) -> list[tuple[Floats, Floats]]:
 
 
 def apart(found: Sequence[tuple[Floats, Floats]]) -> float:
-    """Return how far branches lie apart at most, over the height of the highest, where two reach as far (1)."""
+    """Return how far branches lie apart at most, over the height of the highest (1), where two reach."""
     height = max(float(y.max()) for _, y in found)
     grid = np.linspace(0.0, max(float(x.max()) for x, _ in found), 200)
     rows = [np.where(grid <= x.max(), np.interp(grid, np.maximum.accumulate(x), y), np.nan) for x, y in found]

@@ -86,24 +86,36 @@ def _of_recording(effort: Effort, step: float, measured: Measured) -> list[Claim
     basis = lessons.main.basis
     where = (
         f"recording {measured.name}, {basis.size} equal intervals over the main loop's travel, LMS (8) with "
-        f"step {step:g}, "
-        "every other cycle learned from, the others judged, each taken as 1000 samples"
+        f"step {step:g}, every other cycle learned from, the others judged, each taken as 1000 samples"
     )
     ours = cycles_on(lessons, step, effort.most, 0.0, False, 0)
     found = Spread.of([ratio(ours, n) for n in cycles(effort, step)])
     slower = Claim(
-        "slower-measured", "the convergence in the real setup was much slower than in the simulation",
-        found.median > NOTICEABLE, found, "cycles on the recording over cycles in the ideal simulation", "times",
-        "median above 1.25", where, "", {"cycles": ours},
-    )  # fmt: skip
+        "slower-measured",
+        "the convergence in the real setup was much slower than in the simulation",
+        found.median > NOTICEABLE,
+        found,
+        "cycles on the recording over cycles in the ideal simulation",
+        "times",
+        "median above 1.25",
+        where,
+        "",
+        {"cycles": ours},
+    )
     return [
         slower,
         *minor_claims(
-            Effort(1, effort.most), step, given=lambda seed: lessons, suffix="-measured",
+            Effort(1, effort.most),
+            step,
+            given=lambda seed: lessons,
+            suffix="-measured",
             where=f"{where}, {TAUGHT} cycles",
         ),
         output_noise(
-            effort, step, suffix="-measured", where=f"{where}; noise uniform",
+            effort,
+            step,
+            suffix="-measured",
+            where=f"{where}; noise uniform",
             given=lambda level, own, seed: cycles_on(lessons, step, effort.most, level, own, seed),
         ),
-    ]  # fmt: skip
+    ]

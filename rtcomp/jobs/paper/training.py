@@ -57,7 +57,7 @@ def model_of(basis: Basis, w: Floats) -> HysteresisModel:
 
 @dataclass(frozen=True)
 class Exam:
-    """Motion that frozen weights are judged on, folded so that judging one set of weights costs no samples."""
+    """Motion that frozen weights are judged on, folded so that judging costs no samples."""
 
     gram: Floats
     cross: Floats
@@ -67,7 +67,14 @@ class Exam:
     """N, the largest force."""
 
     @classmethod
-    def on(cls, basis: Basis, shown: Friction, settle: int = CYCLE, x: Floats | None = None, rows: npt.NDArray[np.integer[Any]] | None = None) -> Exam:  # fmt: skip
+    def on(
+        cls,
+        basis: Basis,
+        shown: Friction,
+        settle: int = CYCLE,
+        x: Floats | None = None,
+        rows: npt.NDArray[np.integer[Any]] | None = None,
+    ) -> Exam:
         """Judge on `shown`, its first `settle` rows left out, or on the given `rows` (indices) of it.
 
         `x` are its activations where they are known.
@@ -140,7 +147,7 @@ class Lesson:
 
 @dataclass(frozen=True)
 class Trained:
-    """What training came to: the error of the frozen weights after each cycle (1, (n,)), and the last weights."""
+    """What training came to: the error after each cycle (1, (n,)), weights frozen, and the last weights."""
 
     errors: Floats
     weights: Floats
@@ -152,7 +159,7 @@ class Trained:
 
 
 def lms_gain(lesson: Lesson, step: float) -> float:
-    """Return the learning factor of (8), `step` over the mean squared norm of the clean activations (1/m^2)."""
+    """Return the learning factor of (8), `step` over the mean squared norm of clean activations (1/m^2)."""
     x = lesson.activations()
     return step / float(np.mean(np.sum(x**2, axis=1)))
 
