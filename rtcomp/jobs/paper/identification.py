@@ -263,6 +263,24 @@ def slowed(effort: Effort, step: float, fastest: float) -> list[Claim]:
                 beside,
             )
         )
+    flaws = (ASYMMETRY, SOFTENING)
+    found = ratios(cycles(effort, step, flaws, own=True), own_straight)
+    claims.append(
+        Claim(
+            "both-slow-own-loop",
+            "the same, judged on the loop learned from, as the paper may have judged",
+            found.median > NOTICEABLE,
+            found,
+            "cycles with them over cycles without",
+            "times",
+            "median above 1.25",
+            _where(effort, step).replace("other motion", "the loop learned from"),
+            ""
+            if found.median > NOTICEABLE
+            else "A single loop with these flaws lies within 5 % of what the model can say; that of the paper "
+            "may not have.",
+        )
+    )
     return claims
 
 

@@ -102,6 +102,7 @@ def minor_claims(
     given: Callable[[int], Lessons] | None = None,
     suffix: str = "",
     where: str = "",
+    remark: str = "",
 ) -> list[Claim]:
     """Test what section 3.2 says of training on main and minor loops; `given`: other lessons by seed."""
     make = given or (lambda seed: lessons_of(ASYMMETRY, SOFTENING, seed))
@@ -129,7 +130,7 @@ def minor_claims(
     says = (
         f"Errors, of the peak: main only {percent['error_main_on_main']:.2g} % on main and "
         f"{percent['error_main_on_minor']:.2g} % on minor loops; both {percent['error_both_on_main']:.2g} % "
-        f"and {percent['error_both_on_minor']:.2g} %."
+        f"and {percent['error_both_on_minor']:.2g} %.{remark}"
     )
     return [
         Claim(

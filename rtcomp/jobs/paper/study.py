@@ -110,6 +110,7 @@ def _of_recording(effort: Effort, step: float, measured: Measured) -> list[Claim
             given=lambda seed: lessons,
             suffix="-measured",
             where=f"{where}, {TAUGHT} cycles",
+            remark=" What moved the axis before the recording is not known; the virgin state is assumed.",
         ),
         output_noise(
             effort,
