@@ -74,7 +74,7 @@ def paper_page(done: Study) -> Page:
 
 def _claims(done: Study) -> Columns:
     rows = [[c.name, c.paper, verdict(c), spread(c.value, c.unit), c.quantity] for c in done.claims]
-    return Columns(["claim", "the paper says", "here", "number", "what it is"], rows)
+    return Columns(["claim", "the paper says", "here", "number", "what it is"], rows, figures=(2,))
 
 
 def _told(done: Study) -> Columns:

@@ -148,9 +148,11 @@ def on_minor(
 ) -> Remade:
     """Return Fig. 12a or 12b: minor and main loops, and the model trained on the main one, or on both."""
     weights = train(lessons.both if both else lessons.main, lessons.on_main, step, TAUGHT, whole=True).weights
-    shown = lessons.both
-    said = shown.activations() @ weights
-    last = slice(-4 * CYCLE, None)
+    lesson, rows = lessons.both, lessons.shown
+    said = (lesson.activations() @ weights)[rows]
+    position, force = lesson.position[rows].copy(), lesson.force[rows]
+    # Cycles of a recording need not follow each other: no line from one to the next.
+    position[1:][np.abs(np.diff(position)) > 0.02 * np.ptp(position)] = np.nan
     on_main, on_small = lessons.on_main.error(weights), lessons.on_minor.error(weights)
     return Remade(
         number,
@@ -160,8 +162,8 @@ def on_minor(
         "main loop.",
         f"{source}; LMS (8) with step {step:g}, {TAUGHT} cycles",
         [
-            Trace("measured", shown.position[last], shown.force[last], "measured"),
-            Trace("model", shown.position[last], said[last], "model"),
+            Trace("measured", position, force, "measured"),
+            Trace("model", position, said, "model"),
         ],
         numbers={"error_main": on_main, "error_minor": on_small},
     )

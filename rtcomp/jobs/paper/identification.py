@@ -277,8 +277,8 @@ def slowed(effort: Effort, step: float, fastest: float) -> list[Claim]:
             _where(effort, step).replace("other motion", "the loop learned from"),
             ""
             if found.median > NOTICEABLE
-            else "A single loop with these flaws lies within 5 % of what the model can say; that of the paper "
-            "may not have.",
+            else "A single loop with these flaws lies within 5 % of what the model can say; that of the "
+            "paper may not have.",
         )
     )
     return claims

@@ -135,7 +135,10 @@ def measured_lessons(of: Measured) -> Lessons:
 
     # The first of the main loop still wipes out what the smaller ones left.
     main, later = of.main[1::2], of.main[2::2]
-    return Lessons(lesson(main), lesson([*of.minor[::2], *main]), exam(later), exam(of.minor[1::2]))
+    taught = of.minor[::2]
+    shown = slice(max(0, len(taught) - 2) * CYCLE, (len(taught) + 1) * CYCLE)
+    both = lesson([*taught, *main])
+    return Lessons(lesson(main), both, exam(later), exam(of.minor[1::2]), shown)
 
 
 def cycles_on(of: Lessons, step: float, most: int, level: float, own: bool, seed: int) -> float:

@@ -21,11 +21,13 @@ from rtcomp.jobs.paper.rig import (
     moved,
     rig,
 )
-from rtcomp.jobs.paper.training import Exam, Lesson, train
+from rtcomp.jobs.paper.training import Exam, Lesson, train, train_rls
 from rtcomp.kernels import Floats
 
 TAUGHT = 100
 """Cycles of 1000 samples, in both ways the same."""
+RLS_TAUGHT = 20
+"""Cycles for recursive least squares, which is done with each lesson after once through."""
 MINORS = 4
 """Cycles of minor loops that the lesson goes round in, a main one before each."""
 
@@ -38,6 +40,8 @@ class Lessons:
     both: Lesson
     on_main: Exam
     on_minor: Exam
+    shown: slice
+    """Rows of `both` with minor and main loops, to draw."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,7 @@ def lessons_of(asymmetry: float, softening: float, seed: int) -> Lessons:
         Lesson(basis, second.position, second.force, 2 * CYCLE),
         Exam.on(basis, major, settle=3 * CYCLE),
         Exam.on(basis, other, settle=2 * CYCLE),
+        slice(-4 * CYCLE, None),
     )
 
 
@@ -84,6 +89,12 @@ def taught(lessons: Lessons, step: float) -> Taught:
         main,
         both,
     )
+
+
+def taught_by_rls(lessons: Lessons) -> list[float]:
+    """Return the same four errors, in the order of `Taught`, of weights had by recursive least squares."""
+    ways = [train_rls(of, lessons.on_main, RLS_TAUGHT).weights for of in (lessons.main, lessons.both)]
+    return [exam.error(w) for w in ways for exam in (lessons.on_main, lessons.on_minor)]
 
 
 def roughness(weights: Floats) -> float:
@@ -126,11 +137,16 @@ def minor_claims(
         for way in ("main", "both")
         for loop in ("main", "minor")
     }
+    rls = np.median([taught_by_rls(make(seed)) for seed in range(min(effort.seeds, 5))], axis=0)
+    for name, error in zip(list(errors), rls, strict=True):
+        errors[f"rls_{name}"] = float(error)
     percent = {k: 100 * v for k, v in errors.items()}
     says = (
         f"Errors, of the peak: main only {percent['error_main_on_main']:.2g} % on main and "
         f"{percent['error_main_on_minor']:.2g} % on minor loops; both {percent['error_both_on_main']:.2g} % "
-        f"and {percent['error_both_on_minor']:.2g} %.{remark}"
+        f"and {percent['error_both_on_minor']:.2g} %. With RLS: {percent['rls_error_main_on_main']:.2g}, "
+        f"{percent['rls_error_main_on_minor']:.2g}, {percent['rls_error_both_on_main']:.2g}, "
+        f"{percent['rls_error_both_on_minor']:.2g} %.{remark}"
     )
     return [
         Claim(
