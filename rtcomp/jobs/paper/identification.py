@@ -218,7 +218,7 @@ def slowed(effort: Effort, step: float, fastest: float) -> list[Claim]:
             "lost congruency",
             f"non-congruent-friction, softening {SOFTENING:g}",
         ),
-        "both-slow": ((ASYMMETRY, SOFTENING), "both", "both effects"),
+        "both-slow": ((ASYMMETRY, SOFTENING), "asymmetry and lost congruency", "both effects"),
     }
     straight, own_straight = cycles(effort, step), cycles(effort, step, own=True)
     for name, (flaws, what, effect) in size.items():
@@ -248,7 +248,7 @@ def slowed(effort: Effort, step: float, fastest: float) -> list[Claim]:
         claims.append(
             Claim(
                 name,
-                f"{what} of about the size of Fig. 11 slows the training",
+                f"{what} of about the size of Fig. 11: slower training",
                 found.median > NOTICEABLE,
                 found,
                 "cycles with it over cycles without",
@@ -268,7 +268,7 @@ def slowed(effort: Effort, step: float, fastest: float) -> list[Claim]:
     claims.append(
         Claim(
             "both-slow-own-loop",
-            "the same, judged on the loop learned from, as the paper may have judged",
+            "the same, judged on the loop learned from, as the paper may have judged: slower training",
             found.median > NOTICEABLE,
             found,
             "cycles with them over cycles without",
