@@ -64,13 +64,13 @@ def study(effort: Effort, measured: Measured | None = None, say: Say = lambda pa
         ("convergence", lambda: [convergence(effort, step, table)]),
         ("noise", lambda: [noise(effort, step)]),
         ("asymmetry, congruency", lambda: slowed(effort, step, fastest)),
-        ("minor loops", lambda: minor_claims(effort, step)),
+        ("minor loops", lambda: minor_claims(effort, step, fastest)),
         ("output noise", lambda: [output_noise(effort, step)]),
         ("locality", lambda: locality(effort, step, fastest)),
         ("compensation", lambda: compensation(effort, step, fastest)),
     ]
     if measured is not None:
-        parts.insert(5, ("recording", lambda: _of_recording(effort, step, measured)))
+        parts.insert(5, ("recording", lambda: _of_recording(effort, step, fastest, measured)))
     claims: list[Claim] = []
     for number, (name, test) in enumerate(parts):
         say((number + 0.5) / (len(parts) + 1), name)
@@ -81,7 +81,7 @@ def study(effort: Effort, measured: Measured | None = None, say: Say = lambda pa
     return Study(claims, drawn, step, fastest, effort, measured.name if measured else "")
 
 
-def _of_recording(effort: Effort, step: float, measured: Measured) -> list[Claim]:
+def _of_recording(effort: Effort, step: float, fastest: float, measured: Measured) -> list[Claim]:
     lessons = measured_lessons(measured)
     basis = lessons.main.basis
     where = (
@@ -107,6 +107,7 @@ def _of_recording(effort: Effort, step: float, measured: Measured) -> list[Claim
         *minor_claims(
             Effort(1, effort.most),
             step,
+            fastest,
             given=lambda seed: lessons,
             suffix="-measured",
             where=f"{where}, {TAUGHT} cycles",
