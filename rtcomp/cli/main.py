@@ -34,6 +34,7 @@ COMMANDS = {
     "replay": ("rtcomp.cli.replay:replay", "Put a stage's force balance beside a recording, row by row."),
     "inspect": ("rtcomp.cli.inspect:inspect", "Test a recorded hysteresis: symmetric, congruent, closed?"),
     "trial": ("rtcomp.cli.trial:trial", "Prove the diagnosis on cases whose answers are sealed."),
+    "paper": ("rtcomp.cli.paper:paper", "Make the paper's figures anew and test its claims."),
     "convert": ("rtcomp.cli.convert:convert", "Turn a recording into another format."),
     "drivers": ("rtcomp.cli.drivers:drivers", "List the installed drivers and their settings."),
     "doctor": ("rtcomp.cli.doctor:doctor", "Look at this machine: is it fit for a loop, what mends it."),

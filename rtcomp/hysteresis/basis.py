@@ -108,15 +108,25 @@ def basis_named(name: str) -> type[Basis]:
     return _BASES[name]
 
 
-def regressors(basis: Basis, inputs: Floats, state: Floats | None = None) -> Floats:
+def regressors(
+    basis: Basis, inputs: Floats, state: Floats | None = None, held: Floats | None = None
+) -> Floats:
     """Run the basis over `inputs` (K,) and return the regressors of every sample, shape (K, size).
 
-    Starts from the virgin state, or goes on from `state` (changed in place) whose regressors were zero.
+    Starts from the virgin state, or goes on from `state`, whose regressors were `held` (size,), else zero;
+    both are changed in place, so that the next call goes on from there.
     """
     inputs = np.ascontiguousarray(inputs, dtype=np.float64)
     out = np.empty((inputs.size, basis.size))
     state = basis.initial_state() if state is None else state
-    _run(basis.kernel.address, basis.vector(), state, np.zeros(basis.size), inputs, out)
+    _run(
+        basis.kernel.address,
+        basis.vector(),
+        state,
+        np.zeros(basis.size) if held is None else held,
+        inputs,
+        out,
+    )
     return out
 
 

@@ -17,7 +17,7 @@ from rich.text import Text
 from rtcomp.report.page import Row
 from rtcomp.report.quantities import si, written
 
-__all__ = ["Progress", "Row", "print_summary", "print_verdicts", "say", "si", "summary_table"]
+__all__ = ["Progress", "Row", "print_claims", "print_summary", "print_verdicts", "say", "si", "summary_table"]
 
 _PERIOD = 1.0 / 8.0
 
@@ -150,4 +150,19 @@ def print_verdicts(
         shown = link if link != before else ""
         table.add_row(Text(shown), Text(what), Text(required), Text(seen), mark)
         before = link
+    (console or Console()).print(table)
+
+
+def print_claims(
+    title: str, rows: Sequence[tuple[str, str, str, str, bool]], console: Console | None = None
+) -> None:
+    """Print a table of claims to standard output: name, what is claimed, true or false, the number."""
+    table = Table(title=Text(title, style="bold"), title_justify="left", box=box.HORIZONTALS)
+    table.add_column("claim", no_wrap=True)
+    table.add_column("says", overflow="fold")
+    table.add_column("here", no_wrap=True)
+    table.add_column("number", overflow="fold")
+    for name, says, number, quantity, good in rows:
+        mark = Text("true", style="green") if good else Text("false", style="bold red")
+        table.add_row(Text(name), Text(says), mark, Text(f"{number}: {quantity}"))
     (console or Console()).print(table)

@@ -23,10 +23,19 @@ from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.recording.reader import load
 
 PROJECT = Path(__file__).resolve().parents[2]
-SLOW = ("--serial", "--port", "rtcomp trial", "rtcomp hil", "demo --seed", "bench loop", "bench link")
+SLOW = (
+    "--serial",
+    "--port",
+    "rtcomp trial",
+    "rtcomp hil",
+    "demo --seed",
+    "paper --out",
+    "bench loop",
+    "bench link",
+)
 PATIENCE = 4
 """Times that an example over a port is tried on a machine that is busy with something else."""
-ONCE = ("demo", "diagnose", "trial", "hil")
+ONCE = ("demo", "diagnose", "trial", "hil", "paper")
 """Commands that take long: run with `--json` only."""
 
 

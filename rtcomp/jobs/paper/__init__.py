@@ -1,0 +1,1 @@
+"""The paper's figures and the claims of its text, made anew and tested (`rtcomp paper`)."""
