@@ -27,7 +27,7 @@ from rtcomp.kernels import Floats
 
 FINE, RANGE = 400, 1.0
 CYCLES, SAMPLES, GATE = 60, 500, 0.002
-LEARNER = Rls(0.9999)
+LEARNER = Rls(0.99997)
 
 
 def virgin_curve(draw: np.random.Generator) -> Floats:
@@ -68,9 +68,9 @@ def compare(seed: int, curves: int, noise: float) -> Floats:
 
     Of 20 equal, 20 and 8 self-placed intervals, and of the equal ones learned under other noise.
     """
-    draw = np.random.default_rng(seed)
     fine, equal, found = IntervalBasis.over(FINE, RANGE), IntervalBasis.over(20, RANGE), []
-    for _ in range(curves):
+    for number in range(curves):
+        draw = np.random.default_rng([seed, number])
         slopes = virgin_curve(draw)
         own, other = motion(draw, CYCLES * SAMPLES, CYCLES), motion(draw, 6000, 12)
         clean, wanted = regressors(fine, own) @ slopes, regressors(fine, other) @ slopes

@@ -22,9 +22,9 @@ START_EACH = 10.0
 """Updates an interval before the first change: until then the slopes say little."""
 PATIENT_EACH = 100.0
 """And before intervals that nothing has reached are taken for elsewhere: it may be reached yet."""
-OF_MEAN = 0.2
+OF_MEAN = 0.02
 """A change must gain this share of the mean cost of an interval."""
-OF_PAIR = 0.3
+OF_PAIR = 0.05
 """And this share of what its two intervals cost, where a boundary is to move."""
 OF_NOISE, LONG = 30.0, 2000.0
 """And this many times what noise makes of a weight learned over so many updates: to learn anew costs that."""
