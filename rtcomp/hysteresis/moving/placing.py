@@ -1,12 +1,12 @@
 """Where the intervals belong: to where the virgin curve bends, one interval at a time, never a step.
 
 A slope of the branch is measured in every cell, apart from the weights: force over way while the front
-passes it. From these slopes follows what N chords make of the curve, and which change helps it most: two
-neighbours merged, and the number made up by splitting the interval that is worst, or the same two by moving
-the boundary between them. An interval is split for nothing: both parts take its weight over. Two are merged
-(weights by the integral, so that the virgin curve's height stays) only while both are saturated alike for
-the identifier and for the compensator: there the output is their integral, and stays to the last bit but
-rounding. What a change must gain rises with the noise, so that places come to rest.
+passes it. From these slopes follows what N straight pieces make of the curve, and which change helps it
+most: two neighbours merged, and the number made up by splitting the interval that is worst, or the same two
+by moving the boundary between them. An interval is split for nothing: both parts take its weight over. Two
+are merged (weights by the integral, so that the virgin curve's height stays) only while both are saturated
+alike for the identifier and for the compensator: there the output is their integral, and stays to the last
+bit but rounding. What a change must gain rises with the noise, so that places come to rest.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from rtcomp.hysteresis.moving import places as at
 from rtcomp.hysteresis.moving.branch_slopes import NOISE_MEMORY, slopes
-from rtcomp.hysteresis.moving.chords import best_split, chord, of_noise
+from rtcomp.hysteresis.moving.pieces import best_split, of_noise, piece
 from rtcomp.kernels import Floats, compiled, placing_kernel
 
 START_EACH = 10.0
@@ -24,14 +24,14 @@ PATIENT_EACH = 100.0
 """And before intervals that nothing has reached are taken for elsewhere: it may be reached yet."""
 OF_MEAN = 0.02
 """A change must gain this share of the mean cost of an interval."""
-OF_PAIR = 0.05
+OF_PAIR = 0.1
 """And this share of what its two intervals cost, where a boundary is to move."""
-OF_NOISE, LONG = 30.0, 2000.0
+OF_NOISE, LONG = 5.0, 2000.0
 """And this many times what noise makes of a weight learned over so many updates: to learn anew costs that."""
 OF_HEIGHT = 1e-4
 """And the square of this share of the branch's height over all of its way: less is rounding."""
-OF_SLOPES = 2.0
-"""And this share of what the noise of the slopes makes of a chord."""
+OF_SLOPES = 10.0
+"""And this many times what the noise of the slopes makes of a corner of the branch."""
 _SMALL = 1e-9
 
 
@@ -59,7 +59,7 @@ def look(p: Floats, m: Floats, j: int) -> None:
         m[y + c + 1] = m[y + c] + width * slope
         m[q + c + 1] = m[q + c] + width * width * m[variance + c]
     top = min(high, reached)
-    m[cost + j] = chord(p, m, low, top)
+    m[cost + j] = piece(p, m, low, top)
     m[gain + j] = -np.inf
     least, corner = best_split(p, m, low, top)
     if corner > low:
@@ -71,7 +71,7 @@ def look(p: Floats, m: Floats, j: int) -> None:
     before = int(p[at.EDGES + j - 1])
     m[loss + j - 1], m[shift + j - 1] = 0.0, -np.inf
     if low < reached:
-        m[loss + j - 1] = chord(p, m, before, top) - m[cost + j - 1] - m[cost + j]
+        m[loss + j - 1] = piece(p, m, before, top) - m[cost + j - 1] - m[cost + j]
         least, corner = best_split(p, m, before, top)
         both = m[cost + j - 1] + m[cost + j]
         if corner not in (low, before) and least < (1.0 - OF_PAIR) * both:
