@@ -128,6 +128,9 @@ def compared(
             rival.fit(train, ridge)
             kindest.append(error(rival, test))
         ridge = fitted(rival, train)
+        began = time.thread_time()
+        rival.fit(train, ridge)
+        fit_s = time.thread_time() - began
         rows.append(
             {
                 "name": rival.name, "source": rival.source, "ridge": ridge,
@@ -135,7 +138,7 @@ def compared(
                 "kindest": factor * min(kindest),
                 "each": {m.name: factor * error(rival, [m]) for m in test},
                 "in_sample": factor * error(rival, train),
-                "ns_a_sample": nanoseconds(rival, train[0].u), "bytes": 8 * rival.numbers(),
+                "fit_s": fit_s, "ns_a_sample": nanoseconds(rival, train[0].u), "bytes": 8 * rival.numbers(),
             }
         )  # fmt: skip
     return rows
@@ -144,12 +147,12 @@ def compared(
 def table(title: str, unit: str, rows: Sequence[dict[str, Any]]) -> None:
     sheet = Table(title=title, title_justify="left", box=box.SIMPLE)
     sheet.add_column("")
-    for head in ("held out", "each", "kindest", "in sample", "ns a sample", "bytes"):
+    for head in ("held out", "each", "kindest", "in sample", "s to fit", "ns a sample", "bytes"):
         sheet.add_column(head, justify="right")
     for r in sorted(rows, key=lambda r: float(r["held_out"])):
         each = ", ".join(f"{k} {v:.3g}" for k, v in r["each"].items()) if len(r["each"]) > 1 else ""
         errors = [f"{r['held_out']:.3g} {unit}", each, f"{r['kindest']:.3g}", f"{r['in_sample']:.3g} {unit}"]
-        sheet.add_row(r["name"], *errors, f"{r['ns_a_sample']:.0f}", f"{r['bytes']}")
+        sheet.add_row(r["name"], *errors, f"{r['fit_s']:.2g}", f"{r['ns_a_sample']:.0f}", f"{r['bytes']}")
     Console(width=150).print(sheet)
 
 
