@@ -44,6 +44,11 @@ def figures_of(at: AtRate, link: str) -> list[Figure]:
         found.append(Figure(f"{head}: {name} over cyclictest's", us / rival, "", most, note))
     most = "" if theirs is None else f"<= {share(theirs):.6f}"
     note = f"plain Python {share(plain):.2g} %"
+    if theirs is not None and at.stretches:
+        low, high = (
+            100.0 * d * len(at.stretches["loop"]) / ours.spread.total for d in at.by_chance("cyclictest")
+        )
+        note = f"more than cyclictest by {low:+.2g} to {high:+.2g} %, by chance of its stalls; {note}"
     found.append(Figure(f"{head}: slots missed", share(ours), "%", most, note))
     found.append(Figure(f"{head}: longest", ours.spread.longest, "us", "", "the machine's stalls are in it"))
     return found

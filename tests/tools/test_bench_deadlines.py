@@ -162,3 +162,12 @@ def test_the_ring_of_a_loop_is_not_the_one_that_it_warms_up_on() -> None:
         found.release()
     finally:
         loop.communicate("\n", timeout=60)
+
+
+def test_one_stall_says_nothing_of_who_misses_more() -> None:
+    """Thirty slots in one stretch of many: chance. As many more in every stretch: no chance."""
+    one = AtRate(1000.0, {}, Spread.of([1.0]), {}, {"loop": (30, *[0] * 29), "cyclictest": (0,) * 30})
+    low, high = one.by_chance("cyclictest")
+    assert low == 0.0 and high > 1.0
+    every = AtRate(1000.0, {}, Spread.of([1.0]), {}, {"loop": (3,) * 30, "cyclictest": (1, 2) * 15})
+    assert every.by_chance("cyclictest")[0] > 1.0
