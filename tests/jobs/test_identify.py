@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from rtcomp.jobs.judge import judge, learning_curve, reached
 from rtcomp.loop.tick import COLUMNS
 from rtcomp.recording.reader import read
 
+ROOT = Path(__file__).parents[2]
 SHORT = {"kind": "triangle", "amplitude": 6e-5, "frequency": 1.0, "duration": 3.0}
 
 
@@ -168,8 +171,6 @@ def test_windows_that_a_recording_does_not_have_are_refused(leuven, tmp_path):
 
 def test_a_measured_joint(shared_data):
     """Gear joint of a head: learned on amplitudes up to 0.25 N m, judged frozen on 0.30 N m."""
-    from conftest import ROOT
-
     config = Configuration.load(ROOT / "configs" / "heads_yaw.yaml")
     file = next((shared_data / "real" / "heads-yaw").glob("*.csv.gz"))
     recording = read(file, config.run.recording.map, rate_hz=config.run.recording.rate)
