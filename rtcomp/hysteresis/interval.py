@@ -23,6 +23,17 @@ saturated in this direction; from here on the activations x_i."""
 
 
 @compiled
+def way(s: Floats, u: float) -> float:
+    """Return the way (m) from the last input to `u`, which is noted; none to the first input."""
+    if s[STARTED] == 0.0:
+        s[STARTED] = 1.0
+        s[INPUT] = u
+    distance = u - s[INPUT]
+    s[INPUT] = u
+    return distance
+
+
+@compiled
 def advance(p: Floats, s: Floats, x: Floats, u: float) -> None:
     """Equations (1) to (4), exactly; costs the intervals it touches, not all of them.
 
@@ -30,12 +41,7 @@ def advance(p: Floats, s: Floats, x: Floats, u: float) -> None:
     All intervals before the front are saturated in the direction of motion, so (3) and (4) need not
     sum over them; a reversal starts again at the first.
     """
-    if s[STARTED] == 0.0:
-        s[STARTED] = 1.0
-        s[INPUT] = u
-        return
-    distance = u - s[INPUT]
-    s[INPUT] = u
+    distance = way(s, u)
     if distance == 0.0:
         return
     forward = distance > 0.0
@@ -78,12 +84,7 @@ def respond(p: Floats, s: Floats, weights: Floats, start: float, inputs: Floats,
     count = int(p[0])
     force = start
     for k in range(inputs.size):
-        u = inputs[k]
-        if s[STARTED] == 0.0:
-            s[STARTED] = 1.0
-            s[INPUT] = u
-        distance = u - s[INPUT]
-        s[INPUT] = u
+        distance = way(s, inputs[k])
         if distance != 0.0:
             forward = distance > 0.0
             direction = 1.0 if forward else -1.0

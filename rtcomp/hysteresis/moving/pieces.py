@@ -27,13 +27,17 @@ def residual(n: float, x: float, y: float, xx: float, xy: float, yy: float) -> f
 
 
 @compiled
-def piece(p: Floats, m: Floats, low: int, high: int) -> float:
-    """Return the square error (N^2 m) of one straight piece over the corners `low` to `high`."""
-    if high - low < 3:
-        return 0.0
+def stride_of(low: int, high: int) -> int:
+    """Return how many corners apart those lie that are compared."""
+    return (high - low + POINTS - 1) // POINTS
+
+
+@compiled
+def sums(p: Floats, m: Floats, low: int, high: int) -> tuple[float, float, float, float, float, float]:
+    """Return the sums that `residual` takes, over the corners `low` to `high`, from the first of them."""
     cells = int(p[at.CELLS])
     corner, branch = at.EDGES + int(p[at.COUNT]) + 1, at.ARRAYS + 2 * cells
-    stride = (high - low + POINTS - 1) // POINTS
+    stride = stride_of(low, high)
     n, x, y, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     c = low
     while True:
@@ -43,8 +47,17 @@ def piece(p: Floats, m: Floats, low: int, high: int) -> float:
         n, x, y = n + h, x + h * dx, y + h * dy
         xx, xy, yy = xx + h * dx * dx, xy + h * dx * dy, yy + h * dy * dy
         if c == high:
-            return residual(n, x, y, xx, xy, yy)
+            return n, x, y, xx, xy, yy
         c = after
+
+
+@compiled
+def piece(p: Floats, m: Floats, low: int, high: int) -> float:
+    """Return the square error (N^2 m) of one straight piece over the corners `low` to `high`."""
+    if high - low < 3:
+        return 0.0
+    n, x, y, xx, xy, yy = sums(p, m, low, high)
+    return float(residual(n, x, y, xx, xy, yy))
 
 
 @compiled
@@ -57,20 +70,10 @@ def best_split(p: Floats, m: Floats, low: int, high: int) -> tuple[float, int]:
         return np.inf, low
     cells = int(p[at.CELLS])
     corner, branch = at.EDGES + int(p[at.COUNT]) + 1, at.ARRAYS + 2 * cells
-    stride = (high - low + POINTS - 1) // POINTS
+    stride = stride_of(low, high)
     narrow = max(2.0 * m[at.GATE], p[corner + int(m[at.DEEPEST])] / (FINEST * p[at.COUNT]))
-    # Sums over all of it; then over what lies before a corner, in turn, and by difference behind it.
-    rn, rx, ry, rxx, rxy, ryy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    c = low
-    while True:
-        before, after = max(c - stride, low), min(c + stride, high)
-        h = 0.5 * (p[corner + after] - p[corner + before])
-        dx, dy = p[corner + c] - p[corner + low], m[branch + c] - m[branch + low]
-        rn, rx, ry = rn + h, rx + h * dx, ry + h * dy
-        rxx, rxy, ryy = rxx + h * dx * dx, rxy + h * dx * dy, ryy + h * dy * dy
-        if c == high:
-            break
-        c = after
+    # Over all of it; then over what lies before a corner, in turn, and by difference behind it.
+    rn, rx, ry, rxx, rxy, ryy = sums(p, m, low, high)
     n, x, y, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     least, best, c = np.inf, low, low
     while c < high:

@@ -17,7 +17,7 @@ import numpy as np
 
 from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.basis import Basis, checked_keys, register_basis
-from rtcomp.hysteresis.interval import IntervalBasis
+from rtcomp.hysteresis.interval import IntervalBasis, way
 from rtcomp.hysteresis.moving.places import (
     AMOUNTS,
     BEGUN,
@@ -27,11 +27,9 @@ from rtcomp.hysteresis.moving.places import (
     EDGES,
     FIRST,
     FRONT,
-    INPUT,
     LAST,
     OWN,
     PATH,
-    STARTED,
 )  # fmt: skip
 from rtcomp.hysteresis.moving.placing import place, room
 from rtcomp.kernels import Floats, basis_kernel
@@ -49,12 +47,7 @@ def self_placing_operator(p: Floats, s: Floats, x: Floats, u: float) -> None:
 
     p, s: see `places`. x: x_i - a_i / 2 (m). What was passed since the last reversal is kept for `placing`.
     """
-    if s[STARTED] == 0.0:
-        s[STARTED] = 1.0
-        s[INPUT] = u
-        return
-    distance = u - s[INPUT]
-    s[INPUT] = u
+    distance = way(s, u)
     if distance == 0.0:
         return
     forward = distance > 0.0
