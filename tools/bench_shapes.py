@@ -48,13 +48,12 @@ from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
 from rtcomp.jobs.identify import Identified, follow, friction, identify
 from rtcomp.jobs.judge import Friction
+from rtcomp.jobs.paper.rig import ASYMMETRY, SOFTENING
 from rtcomp.recording.reader import read
 
 RIDGES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 TRAINED, JUDGED = ("08", "11", "19"), ("1", "15")
 VOLTAGES = {"08": "0.8 kV", "1": "1.0 kV", "11": "1.1 kV", "15": "1.5 kV", "19": "1.9 kV"}
-ASYMMETRY, SOFTENING = 0.1, 0.3
-"""Of the failing rig: branches 20 % apart in stiffness, slopes 30 % off at zero force and at the level."""
 FLAWS = [
     {"name": "asymmetric-friction", "asymmetry": ASYMMETRY},
     {"name": "non-congruent-friction", "softening": SOFTENING},

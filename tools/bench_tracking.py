@@ -16,10 +16,8 @@ from rtcomp.jobs.compensate import Compensated, compensate
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
 from rtcomp.jobs.identify import identify
+from rtcomp.jobs.paper.rig import ASYMMETRY, SOFTENING
 from rtcomp.stage.stage import Stage
-
-ASYMMETRY, SOFTENING = 0.1, 0.3
-"""Of the failing rig: branches 20 % apart in stiffness, slopes 30 % off at zero force and at the level."""
 
 
 def compensated(config: Configuration) -> Compensated:

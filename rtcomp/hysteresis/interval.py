@@ -28,7 +28,7 @@ def way(s: Floats, u: float) -> float:
     if s[STARTED] == 0.0:
         s[STARTED] = 1.0
         s[INPUT] = u
-    distance = u - s[INPUT]
+    distance: float = u - s[INPUT]
     s[INPUT] = u
     return distance
 

@@ -11,11 +11,11 @@ import numpy.typing as npt
 
 from rtcomp.errors import RecordingError
 from rtcomp.hysteresis.interval import IntervalBasis
+from rtcomp.inspection.branches import turning_points
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.judge import Friction, friction_of
 from rtcomp.jobs.paper.minor import Lessons
 from rtcomp.jobs.paper.rig import CYCLE, INTERVALS
-from rtcomp.jobs.paper.shape import turning_points
 from rtcomp.jobs.paper.training import Exam, Lesson, activations, train
 from rtcomp.kernels import Floats
 from rtcomp.recording.reader import Recording

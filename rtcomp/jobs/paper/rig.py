@@ -19,15 +19,15 @@ INTERVALS, RANGE_M = 20, 1e-4
 """The paper's intervals, all equally wide, and their sum: what the stage's hysteresis reaches over."""
 ASYMMETRY, SOFTENING = 0.1, 0.3
 """Size of the flaws of Fig. 11: the text calls them minor and gives no number, so the catalogue's examples of
-`asymmetric-friction` and `non-congruent-friction` are taken as they stand."""
+`asymmetric-friction` and `non-congruent-friction` are taken as they stand:
+branches 20 % apart in stiffness, slopes 30 % off at zero force and at the level."""
 
 
 def rig(asymmetry: float = 0.0, softening: float = 0.0) -> Configuration:
     """Return the shipped Leuven stage without sensor noise, with the flaws in its simulated friction.
 
     What the loop believes has no flaws, as in the paper. `asymmetry` and `softening` are the parameters of
-    the
-    effects `asymmetric-friction` and `non-congruent-friction` (both 1).
+    the effects `asymmetric-friction` and `non-congruent-friction` (both 1).
     """
     base = Configuration.load(shipped("leuven.yaml"))
     identify = {**base.file.data["identify"], "smoothing": 0.0}

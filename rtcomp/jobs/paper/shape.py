@@ -6,8 +6,8 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from rtcomp.inspection.branches import turning_points
 from rtcomp.kernels import Floats
 
 
@@ -21,22 +21,6 @@ def since_reversal(position: Floats) -> Floats:
         direction = np.sign(move) if move else direction
         way[k] = abs(move) + (0.0 if turned else way[k - 1])
     return way
-
-
-def turning_points(position: Floats, least: float) -> npt.NDArray[np.int64]:
-    """Return the rows where motion turns back by `least` (m) or more, highs and lows in turn."""
-    found: list[int] = []
-    best, way = 0, 0.0
-    for k in range(1, position.size):
-        if way == 0.0:
-            if abs(position[k] - position[0]) > least:
-                way, best = float(np.sign(position[k] - position[0])), k
-        elif way * (position[k] - position[best]) > 0.0:
-            best = k
-        elif way * (position[best] - position[k]) > least:
-            found.append(best)
-            way, best = -way, k
-    return np.array(found, dtype=np.int64)
 
 
 def mirrored(position: Floats, force: Floats) -> tuple[Floats, Floats, float]:

@@ -10,7 +10,7 @@ import pytest
 from rtcomp.jobs.paper.claim import Spread, cycles_until, participation, ratio
 from rtcomp.jobs.paper.closed_loop import bumps_of
 from rtcomp.jobs.paper.minor import roughness
-from rtcomp.jobs.paper.shape import apart, branches, mirrored, since_reversal, to_and_back, turning_points
+from rtcomp.jobs.paper.shape import apart, branches, mirrored, since_reversal, to_and_back
 from rtcomp.report.paper_page import spread
 
 
@@ -63,13 +63,6 @@ def test_weights_that_only_fall_are_smooth() -> None:
 def test_way_begins_anew_at_every_reversal() -> None:
     way = since_reversal(np.array([0.0, 1.0, 2.0, 2.0, 1.5, 0.5, 1.0]))
     assert way == pytest.approx([0.0, 1.0, 2.0, 2.0, 0.5, 1.5, 0.5])
-
-
-def test_a_reversal_is_one_of_the_size_asked_for() -> None:
-    t = np.linspace(0.0, 3.0, 3001)
-    position = np.sin(2 * np.pi * t) + 0.02 * np.sin(2 * np.pi * 40 * t)
-    turns = turning_points(position, 0.2)
-    assert t[turns] == pytest.approx([0.25, 0.75, 1.25, 1.75, 2.25, 2.75], abs=0.02)
 
 
 def test_a_symmetric_loop_is_its_own_mirror_image() -> None:
