@@ -14,6 +14,7 @@ import numpy as np
 
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics import Effect
+from rtcomp.physics.closing import ClosingBranches
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.physics.program import Program, renew, run_chain
 from rtcomp.physics.speed import MicroDamping, ViscousFriction
@@ -57,7 +58,8 @@ def units_along(
     w[GRAIN] = grain
     base = np.array([stage.mass, stage.force_constant])
     first = len(before), len(before) + SPEED_UNITS
-    _along(program.steps, program.p, program.s, w, base, motion, parts, *first, weights, reaches, out)
+    adding = sum(1 for e in after if e.name == ClosingBranches.name)
+    _along(program.steps, program.p, program.s, w, base, motion, parts, *first, adding, weights, reaches, out)
     return out
 
 
@@ -72,11 +74,17 @@ def _along(
     parts: int,
     first: int,
     elements: int,
+    adding: int,
     weights: Floats,
     reaches: Floats,
     out: Floats,
 ) -> None:
-    """Fill `out`; units are the effects from `first` on, stop elements those from `elements` on."""
+    """Fill `out`; units are the effects from `first` on, stop elements those from `elements` on.
+
+    What changes the whole of friction is shared out among the stop elements: of the first `adding` such
+    effects by their level, for what those add is there while friction passes through zero too; of the others
+    in proportion to what each holds.
+    """
     count = weights.size
     level = stiffness = 0.0
     for i in range(count):
@@ -98,7 +106,12 @@ def _along(
             # The whole is what the chain sees from here on, and at the next step.
             w[GRIP], w[GRIP_LEVEL], w[GRIP_STIFFNESS] = total, level, stiffness
             w[FRICTION] = total
-            run_chain(steps, p, s, w, elements + count, steps[0])
-            if total != 0.0:
-                for i in range(elements - first, out.shape[1]):
-                    out[k, i] *= w[FRICTION] / total
+            after = elements + count
+            run_chain(steps, p, s, w, after, after + adding)
+            added, whole = w[FRICTION] - total, w[FRICTION]
+            run_chain(steps, p, s, w, after + adding, steps[0])
+            for i in range(elements - first, out.shape[1]):
+                if added != 0.0:
+                    out[k, i] += added * reaches[i - elements + first] / level
+                if whole != 0.0:
+                    out[k, i] *= w[FRICTION] / whole

@@ -21,6 +21,7 @@ from rtcomp.diagnosis.motion import BLOCKS, Motion, Strip
 from rtcomp.diagnosis.path import Load, behind_play, derivatives, kinematics
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place
+from rtcomp.physics.closing import ClosingBranches
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.stage.balance import STEADY, around_rows, forces
 from rtcomp.stage.stage import Stage
@@ -36,7 +37,7 @@ REMEMBERED = 24
 """Tables of friction kept at a time: those of the entries that are refined together."""
 
 
-WHOLE = ("load-dependent-friction", "creep", "non-congruent-friction")
+WHOLE = ("load-dependent-friction", "creep", "non-congruent-friction", ClosingBranches.name)
 """Modifiers that ask for the whole of friction, so that its weights change what its units do."""
 
 
@@ -120,6 +121,7 @@ class Ledger:
     def _make(self, effects: Sequence[Effect]) -> System:
         drive = [e for e in effects if e.place is Place.DRIVE]
         modifiers = [e for e in effects if e.place is Place.FRICTION]
+        modifiers += [companion for e in modifiers for companion in e.companions()]
         sensors = [e for e in effects if e.place is Place.SENSOR]
         others = [e for e in effects if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
         play = next((e for e in others if e.name == "backlash" and e.values["gap"] > 0.0), None)

@@ -20,8 +20,8 @@ from rtcomp.physics.growing import GROWTH
 
 SCALING = ("drive-gain", "sensor-scale", "inertia")
 """Entries that do what other believed numbers would do together."""
-SEARCHED = ("time",)
-"""Parameters that the search settles: a jump is between two rows."""
+SEARCHED = ("time", "closing")
+"""Parameters that the search settles: a jump is between two rows, branches close or do not."""
 BETWEEN = (0.02, 0.98)
 """Range of a stiffening that is refined."""
 BELIEF = 3e-4

@@ -51,7 +51,7 @@ def screen(
     ledger, seen = fitted.ledger, fitted.ledger.seen
     # An entry that shrinks the drive side shrinks every error; all are stated for the believed drive.
     power = float(fitted.system.blocks.power[seen].sum())
-    best: dict[tuple[str, bool, bool, bool], Screened] = {}
+    best: dict[tuple[str, *tuple[bool, ...]], Screened] = {}
     others = [effect_of(e) for e in effects]
     all_searches = list(searches(scene))
     for number, search in enumerate(all_searches):
@@ -110,7 +110,7 @@ def _smaller(fitted: Fitted, system: System, tried: Point) -> tuple[Entry, Float
     return entry, extended.blocks.left_out(ledger.seen, bounds)
 
 
-def _form(entry: Entry) -> tuple[bool, bool, bool]:
-    """Say in which of its forms an entry is: whether what sticks follows it, whether its contact is soft,
-    whether its wave has a harmonic."""
-    return bool(entry.get("following")), "contact" in entry, "harmonics" in entry
+def _form(entry: Entry) -> tuple[bool, ...]:
+    """Say in which of its forms an entry is: whether what sticks follows it, whether its branches close,
+    whether its contact is soft, whether its wave has a harmonic."""
+    return bool(entry.get("following")), "closing" in entry, "contact" in entry, "harmonics" in entry

@@ -56,7 +56,11 @@ def _both_ways(points: list[Entry]) -> list[Entry]:
 
 def _presliding(s: Scene) -> list[Point]:
     reach = float(s.fitted.ledger.reaches.max())
-    points: list[Entry] = [{"name": "asymmetric-friction", "asymmetry": a} for a in (-0.2, -0.05, 0.05, 0.2)]
+    points: list[Entry] = [
+        {"name": "asymmetric-friction", "asymmetry": a, **kind}
+        for kind in ({}, {"closing": 1.0})
+        for a in (-0.2, -0.05, 0.05, 0.2)
+    ]
     points += [{"name": "non-congruent-friction", "softening": a} for a in (0.05, 0.2, 0.5)]
     points += _both_ways(
         [

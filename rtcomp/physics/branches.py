@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
+from rtcomp.physics.closing import ASYMMETRY, ClosingBranches
 from rtcomp.physics.effect import Effect, Parameter, Place
 from rtcomp.physics.wires import FRICTION, GRAIN, GRIP, GRIP_LEVEL, MOVED, REACH, SCALE
 
 
 @effect_kernel
 def asymmetric_friction(p: Floats, s: Floats, w: Floats) -> None:
-    """p: asymmetry (1); s: place (m) within the sensor's grain, inside which motion has no direction."""
+    """p: asymmetry (1), closing (1).
+
+    s: place (m) within the sensor's grain, inside which motion has no direction.
+    """
+    if p[1] > 0.0:
+        return
     inside = s[0] + w[MOVED]
     s[0] = min(max(inside, -w[GRAIN]), w[GRAIN])
     w[MOVED] += p[0] * abs(inside - s[0])
@@ -29,22 +36,31 @@ def non_congruent_friction(p: Floats, s: Floats, w: Floats) -> None:
 
 @register
 class AsymmetricFriction(Effect):
-    """Stop elements that are stiffer when they are loaded forward than when backward, at equal yield force.
+    """Presliding that is stiffer forward than backward, up to the same level: of two kinds.
 
-    The friction model sees displacements (1 + asymmetry) times as long forward and (1 - asymmetry) times
-    backward; so the levels of sliding are alike (a difference of those is `constant-force`, from which no
-    motion that slides both ways can tell it), and every model takes part.
+    With `closing` 0 stop elements are stiffer when they are loaded forward, at equal yield force: the friction
+    model sees displacements (1 + asymmetry) times as long forward and (1 - asymmetry) times backward; so the
+    levels of sliding are alike (a difference of those is `constant-force`, from which no motion that slides
+    both ways can tell it), and every model takes part.
 
     An element's loop that yields on both sides, or on the stiffer one, closes and dissipates. One that yields
     on neither moves towards the stiffer side, by 2 k asymmetry for each unit of its travel there and back,
     until it yields there and its loop closes too. This ratcheting is bounded by the yield force, but while it
     lasts it is not passive. Reversals within GRAIN, the noise of a recorded position, have no direction, so
     that noise does not ratchet.
+
+    With `closing` 1 the branches as such differ: how far one has come from its reversal to where it leads is
+    bent, so that it begins 1 + asymmetry times as steep forward, 1 - asymmetry backward, and every loop
+    closes (`ClosingBranches`). Loops that stay small are then next to symmetric. Only loops that slide on
+    neither side tell the two apart.
     """
 
     name = "asymmetric-friction"
     place = Place.FRICTION
-    parameters = (Parameter("asymmetry", "1", -0.9, 0.9, "difference of stiffness over its sum"),)
+    parameters = (
+        ASYMMETRY,
+        Parameter("closing", "1", 0.0, 1.0, "1: every loop closes, 0: small ones move to the stiffer side", 0.0),
+    )
     kernel = asymmetric_friction
     says = "presliding is stiffer in one direction than in the other, up to the same level"
     equation = "dz = (1 + asymmetry sgn(dx)) dx"
@@ -55,6 +71,18 @@ class AsymmetricFriction(Effect):
     neutral = {"asymmetry": 0.0}
     order = 40
     states = 1
+
+    def __init__(self, **values: float) -> None:
+        super().__init__(**values)
+        closing = self.values["closing"]
+        if closing not in (0.0, 1.0):
+            raise ConfigError(f"{self.name}: closing is {closing:g}; allowed is 0 or 1", key=("closing",))
+
+    def companions(self) -> list[Effect]:
+        """Return what bends the branches, where they close."""
+        if self.values["closing"] == 0.0:
+            return []
+        return [ClosingBranches(asymmetry=self.values["asymmetry"])]
 
 
 @register

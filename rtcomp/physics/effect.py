@@ -26,6 +26,7 @@ left (60 resonance; 70 backlash, after which MOVED and VELOCITY are the load's).
     30  creep                           MOVED less what the contacts creep
     40  asymmetric-friction             MOVED larger forward than backward
     50  models and speed laws           add to FRICTION; a model leaves GRIP, GRIP_LEVEL, GRIP_STIFFNESS
+    70  asymmetric-friction, closing    bends GRIP and exchanges it in FRICTION
     80  non-congruent-friction          bends GRIP and exchanges it in FRICTION
    100  (end of backlash)               FRICTION acts on the load behind the play: BEHIND
 

@@ -66,7 +66,7 @@ VOCABULARY = {
     "friction": {
         "viscous-friction": "coefficient (N s/m)",
         "quadratic-drag": "coefficient (N s^2/m^2)",
-        "asymmetric-friction": "asymmetry (1)",
+        "asymmetric-friction": "asymmetry (1), closing (1)",
         "asymmetric-viscous-friction": "ratio (1)",
         "stribeck": "rise (1), velocity (m/s), stiffening (1), following (1)",
         "position-dependent-friction": "amplitude (1), period (m), phase (rad), slope (1/m), "

@@ -41,6 +41,11 @@ MODIFIERS: list[list[dict[str, Any]]] = [
     [{"name": "creep", "fraction": 0.3, "time_constant": 0.2}],
     [{"name": "non-congruent-friction", "softening": 0.4}],
     [{"name": "asymmetric-friction", "asymmetry": 0.2}, {"name": "non-congruent-friction", "softening": 0.3}],
+    [{"name": "asymmetric-friction", "asymmetry": 0.3, "closing": 1.0}],
+    [
+        {"name": "asymmetric-friction", "asymmetry": -0.2, "closing": 1.0},
+        {"name": "non-congruent-friction", "softening": 0.3},
+    ],
     [{"name": "stiction-ageing", "growth": 0.1, "distance": 1e-6}],
     [
         {"name": "frictional-lag", "time_constant": 0.02},
@@ -58,6 +63,7 @@ def test_units_with_their_weights_are_the_stages_friction(entries: list[dict[str
     held = np.sin(3.0 * time)
     motion = np.column_stack([time, x, v, np.gradient(v, time), held])
     modifiers = [build(e) for e in entries]
+    modifiers += [companion for e in modifiers for companion in e.companions()]
     reaches = np.array([4e-6, 1.2e-5])
     weights = believed_weights(stage, reaches)
     drive = [e for e in stage.chain if e.place is Place.DRIVE]

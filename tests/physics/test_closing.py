@@ -1,0 +1,111 @@
+"""Asymmetric branches that close: against their closed form, and what a memory without drift must keep."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtcomp import physics
+from rtcomp.errors import ConfigError
+from rtcomp.physics.closing import DEPTH
+from rtcomp.physics.maxwell_slip import MaxwellSlip
+from rtcomp.physics.rows import motion_rows, over_rows
+from rtcomp.physics.wires import FRICTION
+
+REACH = 5e-6
+CURVE = MaxwellSlip([(4e5, 1e-6), (3e5, 2e-6), (2e5, 3.5e-6), (1e5, 5e-6)])
+LEVEL = CURVE.level
+
+
+def closing(asymmetry: float) -> physics.Effect:
+    return physics.build({"name": "asymmetric-friction", "asymmetry": asymmetry, "closing": 1.0})
+
+
+def force(x: np.ndarray, *effects: physics.Effect) -> np.ndarray:
+    """Friction (N) along positions from 0, of the elements above and `effects` with what they bring."""
+    chain = [CURVE, *effects, *(c for e in effects for c in e.companions())]
+    rows = motion_rows(np.asarray(x, dtype=float), 1e-3)
+    return over_rows(sorted(chain, key=lambda e: (e.place, e.order)), rows)[:, FRICTION]
+
+
+def path(*corners: float, step: float = 5e-8) -> np.ndarray:
+    """Positions from 0 through `corners`, all of them among these."""
+    x = [0.0]
+    for corner in corners:
+        count = max(round(abs(corner - x[-1]) / step), 1)
+        x += list(np.linspace(x[-1], corner, count + 1)[1:])
+    return np.array(x[1:])
+
+
+def test_branches_from_sliding_are_the_models_to_another_exponent() -> None:
+    a, x = 0.25, path(-3e-5, 3e-5)
+    plain, bent = force(x), force(x, closing(a))
+    up = np.arange(x.size) >= np.argmin(x)
+    part = 0.5 * (plain / LEVEL + 1.0)
+    np.testing.assert_allclose(bent[up] / LEVEL, 1.0 - 2.0 * (1.0 - part[up]) ** (1.0 + a), atol=1e-9)
+    mirrored = force(-x, closing(-a))
+    np.testing.assert_allclose(mirrored, -bent, atol=1e-12)
+
+
+def test_the_first_branch_is_as_much_stiffer_as_asked_for() -> None:
+    for a in (-0.3, 0.2):
+        up, down, plain = (force(s * path(1e-9, step=1e-9), closing(a))[0] for s in (1.0, -1.0, 0.0))
+        assert plain == 0.0
+        assert (up + down) / (up - down) == pytest.approx(a, rel=1e-3)
+
+
+corners = st.lists(st.floats(-6e-6, 6e-6), min_size=1, max_size=8)
+
+
+@settings(max_examples=60, deadline=None)
+@given(corners, st.floats(-0.9, 0.9), st.floats(0.02, 0.95), st.booleans())
+def test_every_loop_closes_at_once(places: list[float], a: float, part: float, slid: bool) -> None:
+    before = path(*([3e-5, -3e-5] if slid else []), *places)
+    start = before[-1]
+    towards = 1.0 if before.size < 2 or before[-1] < before[-2] else -1.0
+    loop = start + towards * part * 3e-6 * np.concatenate([np.linspace(0, 1, 60), np.linspace(1, 0, 60)[1:]])
+    f = force(np.concatenate([before, loop[1:], loop[1:]]), closing(a)) / LEVEL
+    again = f[-loop.size + 1 :]
+    assert f[-1] == pytest.approx(f[before.size - 1], abs=1e-9) or abs(f[before.size - 1]) > 1 - 1e-9
+    np.testing.assert_allclose(again, f[-2 * loop.size + 2 : -loop.size + 1], atol=1e-9)
+    assert np.abs(f).max() <= 1.0 + 1e-12
+
+
+@settings(max_examples=40, deadline=None)
+@given(corners, st.floats(-0.9, 0.9))
+def test_small_loops_that_closed_are_forgotten(places: list[float], a: float) -> None:
+    """Wiping-out: after a return over it, what came between is gone."""
+    outer = path(3e-5, -1e-5, 4e-6, -2e-6)
+    inner = np.array([p * 0.2 for p in places])
+    direct = np.concatenate([outer, outer[-1] + path(5e-6)])
+    between = [outer[-1] + 1.5e-6 + 1.2e-6 * np.tanh(p / 1e-6) for p in inner]
+    wander = np.concatenate([outer, outer[-1] + path(*(b - outer[-1] for b in between), 5e-6)])
+    assert force(wander, closing(a))[-1] == pytest.approx(force(direct, closing(a))[-1], abs=1e-9 * LEVEL)
+
+
+@settings(max_examples=40, deadline=None)
+@given(corners, st.floats(-0.3, 0.3), st.floats(0.1, 0.9))
+def test_loops_dissipate(places: list[float], a: float, part: float) -> None:
+    before = path(3e-5, -3e-5, *places)
+    way = 1.0 if before[-1] < before[-2] else -1.0
+    loop = before[-1] + way * part * 6e-6 * np.concatenate([np.linspace(0, 1, 200), np.linspace(1, 0, 200)])
+    x = np.concatenate([before, loop, loop])
+    f = force(x, closing(a))
+    last = slice(x.size - loop.size, None)
+    work = float(np.sum(np.diff(x[last]) * 0.5 * (f[last][1:] + f[last][:-1])))
+    assert work >= -1e-4 * LEVEL * part * 6e-6
+
+
+def test_more_reversals_than_are_kept_lose_the_smallest_loops_only() -> None:
+    sizes = 4e-6 * 0.95 ** np.arange(4 * DEPTH)
+    spiral = [3e-5, *(s * (-1.0) ** k for k, s in enumerate(sizes))]
+    f = force(path(*spiral, 3e-5, step=2e-8), closing(0.3)) / LEVEL
+    assert np.abs(f).max() <= 1.0
+    assert f[-1] == 1.0
+
+
+def test_a_kind_between_the_two_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"closing is 0\.5; allowed is 0 or 1"):
+        physics.build({"name": "asymmetric-friction", "asymmetry": 0.1, "closing": 0.5})
