@@ -28,6 +28,10 @@ NEARLY = 0.93
 BESIDE = {"backlash": "resonance", "resonance": "backlash"}
 """Entries not looked for beside each other: a play has a contact that rings, a second mass goes loose."""
 
+UNDECIDED = {"asymmetric-friction": "closing"}
+"""Entries whose forms, by this parameter, only a settled fit tells apart: one asks for the whole of friction,
+of which the base that has bent to the effect gives a wrong picture."""
+
 Progress = Callable[[float, str], None]
 
 
@@ -59,12 +63,14 @@ def best_addition(
     hopeful = [s for s in hopeful if s.gain(current.errors) > LEAST_SHARE][:SHORTLIST]
     tried: list[Refined] = []
     gains: dict[str, float] = {}
+    also: dict[str, list[Refined]] = {}
     for i, s in enumerate(hopeful):
-        done = _quickly(current, motion, entries, s)
-        if done is None:
+        forms = _quickly(current, motion, entries, s)
+        if not forms:
             continue
-        gains[last(done)] = 1.0 - float(done.errors.sum() / current.errors.sum())
-        tried.append(done)
+        also[s.name] = forms[1:]
+        gains[last(forms[0])] = 1.0 - float(forms[0].errors.sum() / current.errors.sum())
+        tried.append(forms[0])
         progress(0.6 + 0.4 * (i + 1) / len(hopeful), "refine")
     tried.sort(key=lambda r: float(r.errors.sum()))
     if not tried:
@@ -72,7 +78,8 @@ def best_addition(
     for i, r in enumerate(tried[:CONTENDERS]):
         if gains[last(r)] > 0.5 * gains[last(tried[0])]:
             # On its own grid of reaches: a base that has bent to an effect is no fair ground for its name.
-            tried[i] = settle(stage, motion, r, SCALES)
+            forms = [settle(stage, motion, form, SCALES) for form in (r, *also.get(last(r), []))]
+            tried[i] = min(forms, key=lambda form: float(form.errors.sum()))
             gains[last(r)] = 1.0 - float(tried[i].errors.sum() / current.errors.sum())
     tried = plainest(tried)
     best = least_far(tried, current)
@@ -99,8 +106,11 @@ def _variants(entry: Entry, stage: Stage) -> list[Entry]:
     return [entry]
 
 
-def _quickly(current: Fitted, motion: Motion, entries: list[Entry], screened: Screened) -> Refined | None:
-    """Return a few steps of refinement of the best form of an entry; None where none can be evaluated."""
+def _quickly(current: Fitted, motion: Motion, entries: list[Entry], screened: Screened) -> list[Refined]:
+    """Return a few steps of refinement of the best form of an entry, or of those between which they leave open.
+
+    Empty where none can be evaluated.
+    """
     found = []
     for variant in [*_variants(screened.entry, current.ledger.stage), *screened.forms]:
         try:
@@ -108,7 +118,14 @@ def _quickly(current: Fitted, motion: Motion, entries: list[Entry], screened: Sc
             found.append(refine(current, motion, made, which=[len(entries)], tries=QUICK))
         except (ConfigError, np.linalg.LinAlgError):
             continue
-    return min(found, key=lambda r: float(r.errors.sum()) * _handicap(r.entries[-1]), default=None)
+    found.sort(key=lambda r: float(r.errors.sum()) * _handicap(r.entries[-1]))
+    open_still = [r for r in found[1:] if r.entries[-1]["name"] in UNDECIDED]
+    return [*found[:1], *(r for r in open_still if _by_kind(r) != _by_kind(found[0]))][:2]
+
+
+def _by_kind(refined: Refined) -> object:
+    """Return what tells the forms of an entry apart that a few steps leave open."""
+    return refined.entries[-1].get(UNDECIDED.get(str(refined.entries[-1]["name"]), ""))
 
 
 def _handicap(entry: Entry) -> float:

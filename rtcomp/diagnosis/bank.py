@@ -24,6 +24,8 @@ from rtcomp.stage.stage import Stage
 
 SPEED_UNITS = 2
 """Units before the stop elements: viscous friction, micro-damping."""
+MORE = 1e-4
+"""Part of the level that an element is made larger by, to see what it does to bent branches."""
 
 
 def units_along(
@@ -49,7 +51,11 @@ def units_along(
     chain = sorted(modifiers, key=lambda e: e.order)
     before = [*sorted(drive, key=lambda e: (e.place, e.order)), *(e for e in chain if e.order < models)]
     after = [e for e in chain if e.order > models]
-    program = Program([*before, *units, *after])
+    bending = [e for e in after if e.name == ClosingBranches.name]
+    # One for the whole, and one for each element: the whole as it would be with a little more of that one.
+    bent = [e for e in bending for _ in range(1 + len(reaches))]
+    after = [e for e in after if e.name != ClosingBranches.name]
+    program = Program([*before, *units, *bent, *after])
     row = float((motion[-1, 0] - motion[0, 0]) / max(motion.shape[0] - 1, 1))
     longest = min((e.longest_step() for e in [*before, *after]), default=math.inf)
     parts = max(math.ceil(row / longest - 1e-9), 1)
@@ -58,8 +64,7 @@ def units_along(
     w[GRAIN] = grain
     base = np.array([stage.mass, stage.force_constant])
     first = len(before), len(before) + SPEED_UNITS
-    adding = sum(1 for e in after if e.name == ClosingBranches.name)
-    _along(program.steps, program.p, program.s, w, base, motion, parts, *first, adding, weights, reaches, out)
+    _along(program.steps, program.p, program.s, w, base, motion, parts, *first, len(bent), weights, reaches, out)
     return out
 
 
@@ -74,18 +79,19 @@ def _along(
     parts: int,
     first: int,
     elements: int,
-    adding: int,
+    bent: int,
     weights: Floats,
     reaches: Floats,
     out: Floats,
 ) -> None:
     """Fill `out`; units are the effects from `first` on, stop elements those from `elements` on.
 
-    What changes the whole of friction is shared out among the stop elements: of the first `adding` such
-    effects by their level, for what those add is there while friction passes through zero too; of the others
-    in proportion to what each holds.
+    What changes the whole of friction is shared out among the stop elements in proportion to what each holds;
+    but branches that are bent, by `bent` effects where there are any, by what a little more of an element
+    does to the whole: such a fit converges, where bent branches are far from those of the weights at hand.
     """
     count = weights.size
+    slopes = np.zeros(count)
     level = stiffness = 0.0
     for i in range(count):
         level += weights[i] * reaches[i]
@@ -107,11 +113,23 @@ def _along(
             w[GRIP], w[GRIP_LEVEL], w[GRIP_STIFFNESS] = total, level, stiffness
             w[FRICTION] = total
             after = elements + count
-            run_chain(steps, p, s, w, after, after + adding)
-            added, whole = w[FRICTION] - total, w[FRICTION]
-            run_chain(steps, p, s, w, after + adding, steps[0])
-            for i in range(elements - first, out.shape[1]):
-                if added != 0.0:
-                    out[k, i] += added * reaches[i - elements + first] / level
-                if whole != 0.0:
+            if bent > 0 and level > 0.0:
+                for i in range(count):
+                    more = MORE * level / reaches[i]
+                    w[GRIP] = total + more * out[k, elements - first + i]
+                    w[GRIP_LEVEL] = level + more * reaches[i]
+                    run_chain(steps, p, s, w, after + 1 + i, after + 2 + i)
+                    slopes[i] = w[GRIP] / more
+                w[GRIP], w[GRIP_LEVEL], w[FRICTION] = total, level, total
+                run_chain(steps, p, s, w, after, after + 1)
+                rest = w[GRIP]
+                for i in range(count):
+                    slopes[i] -= w[GRIP] / (MORE * level / reaches[i])
+                    rest -= weights[i] * slopes[i]
+                for i in range(count):  # what is missing of the whole is the rounding of these differences
+                    out[k, elements - first + i] = slopes[i] + rest * reaches[i] / level
+            whole = w[FRICTION]
+            run_chain(steps, p, s, w, after + bent, steps[0])
+            if whole != 0.0:
+                for i in range(elements - first, out.shape[1]):
                     out[k, i] *= w[FRICTION] / whole

@@ -84,7 +84,8 @@ def fit_base(
     best: Fitted | None = None
     given = list(effects or [])
     names = [e.name for e in given]
-    whole, play = any(name in WHOLE for name in names), "backlash" in names
+    at_work_too = [companion.name for e in given for companion in e.companions()]
+    whole, play = any(name in WHOLE for name in (*names, *at_work_too)), "backlash" in names
     known = [e for e in map(physics.build, stage.mechanics.effects) if e.place is not physics.Place.DRIVE]
     for scale in scales:
         ledger = Ledger(stage, motion, grid_of(stage, scale), known)

@@ -59,7 +59,7 @@ def _presliding(s: Scene) -> list[Point]:
     points: list[Entry] = [
         {"name": "asymmetric-friction", "asymmetry": a, **kind}
         for kind in ({}, {"closing": 1.0})
-        for a in (-0.2, -0.05, 0.05, 0.2)
+        for a in (-0.45, -0.2, -0.05, 0.05, 0.2, 0.45)
     ]
     points += [{"name": "non-congruent-friction", "softening": a} for a in (0.05, 0.2, 0.5)]
     points += _both_ways(
