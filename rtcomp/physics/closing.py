@@ -21,7 +21,7 @@ DEPTH: Final = 64
 HELD, BENT, WAY, COUNT, SLID, TURNS = range(6)
 """State: the model's force over its level, the bent one, the direction, reversals kept, whether it ever slid;
 from here on the model's force at each reversal, then the bent one."""
-_SLIDES = 1.0 - 1e-9
+_SLIDES, _LEAST = 1.0 - 1e-9, 1e-12
 
 
 @compiled
@@ -56,7 +56,7 @@ def bend(s: Floats, held: float, asymmetry: float) -> float:
     s[WAY], s[HELD] = way, held
     while True:
         n = int(s[COUNT])
-        if abs(held) >= _SLIDES:
+        if way * held >= _SLIDES:
             s[COUNT], s[SLID], s[BENT] = 0.0, 1.0, way
             return way
         if n == 1 and s[SLID] == 0.0:  # beyond the first reversal ever the virgin curve goes on
@@ -75,8 +75,10 @@ def bend(s: Floats, held: float, asymmetry: float) -> float:
         if gone >= whole:
             s[COUNT] = float(n - 2)
             continue
-        to = s[TURNS + DEPTH + n - 2]
-        s[BENT] = bent + (to - bent) * rise(gone, exponent) / rise(whole, exponent)
+        to, all_of_it = s[TURNS + DEPTH + n - 2], rise(whole, exponent)
+        # Of loops as small as rounding only their ends are left.
+        part = rise(gone, exponent) / all_of_it if all_of_it > _LEAST else gone / whole
+        s[BENT] = bent + (to - bent) * part
         return float(s[BENT])
 
 

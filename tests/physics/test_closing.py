@@ -107,6 +107,17 @@ def test_more_reversals_than_are_kept_lose_the_smallest_loops_only() -> None:
     assert f[-1] == 1.0
 
 
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10_000), st.floats(-0.9, 0.9))
+def test_rounding_at_rest_changes_nothing(seed: int, a: float) -> None:
+    """Where a level is another at each step the held part of it jitters by its last digits."""
+    before = path(3e-5, -1e-5, 2e-6)
+    random = np.random.default_rng(seed)
+    still = before[-1] * (1.0 + 4e-16 * random.integers(-2, 3, 400))
+    f = force(np.concatenate([before, still]), closing(a))
+    np.testing.assert_allclose(f[before.size :], f[before.size - 1], atol=1e-9 * LEVEL)
+
+
 def test_a_kind_between_the_two_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"closing is 0\.5; allowed is 0 or 1"):
         physics.build({"name": "asymmetric-friction", "asymmetry": 0.1, "closing": 0.5})
