@@ -107,7 +107,7 @@ def _variants(entry: Entry, stage: Stage) -> list[Entry]:
 
 
 def _quickly(current: Fitted, motion: Motion, entries: list[Entry], screened: Screened) -> list[Refined]:
-    """Return a few steps of refinement of the best form of an entry, or of those between which they leave open.
+    """Return the best form of an entry after a few steps of refinement, and another if they leave that open.
 
     Empty where none can be evaluated.
     """

@@ -64,7 +64,9 @@ def units_along(
     w[GRAIN] = grain
     base = np.array([stage.mass, stage.force_constant])
     first = len(before), len(before) + SPEED_UNITS
-    _along(program.steps, program.p, program.s, w, base, motion, parts, *first, len(bent), weights, reaches, out)
+    _along(
+        program.steps, program.p, program.s, w, base, motion, parts, *first, len(bent), weights, reaches, out
+    )
     return out
 
 
@@ -86,12 +88,10 @@ def _along(
 ) -> None:
     """Fill `out`; units are the effects from `first` on, stop elements those from `elements` on.
 
-    What changes the whole of friction is shared out among the stop elements in proportion to what each holds;
-    but branches that are bent, by `bent` effects where there are any, by what a little more of an element
-    does to the whole: such a fit converges, where bent branches are far from those of the weights at hand.
+    After these come `bent` effects that bend branches. What else changes the whole of friction is shared out
+    among the stop elements in proportion to what each holds.
     """
     count = weights.size
-    slopes = np.zeros(count)
     level = stiffness = 0.0
     for i in range(count):
         level += weights[i] * reaches[i]
@@ -112,24 +112,45 @@ def _along(
             # The whole is what the chain sees from here on, and at the next step.
             w[GRIP], w[GRIP_LEVEL], w[GRIP_STIFFNESS] = total, level, stiffness
             w[FRICTION] = total
-            after = elements + count
             if bent > 0 and level > 0.0:
-                for i in range(count):
-                    more = MORE * level / reaches[i]
-                    w[GRIP] = total + more * out[k, elements - first + i]
-                    w[GRIP_LEVEL] = level + more * reaches[i]
-                    run_chain(steps, p, s, w, after + 1 + i, after + 2 + i)
-                    slopes[i] = w[GRIP] / more
-                w[GRIP], w[GRIP_LEVEL], w[FRICTION] = total, level, total
-                run_chain(steps, p, s, w, after, after + 1)
-                rest = w[GRIP]
-                for i in range(count):
-                    slopes[i] -= w[GRIP] / (MORE * level / reaches[i])
-                    rest -= weights[i] * slopes[i]
-                for i in range(count):  # what is missing of the whole is the rounding of these differences
-                    out[k, elements - first + i] = slopes[i] + rest * reaches[i] / level
+                held = out[k, elements - first :]
+                _bend(steps, p, s, w, elements + count, total, level, weights, reaches, held)
             whole = w[FRICTION]
-            run_chain(steps, p, s, w, after + bent, steps[0])
+            run_chain(steps, p, s, w, elements + count + bent, steps[0])
             if whole != 0.0:
                 for i in range(elements - first, out.shape[1]):
                     out[k, i] *= w[FRICTION] / whole
+
+
+@compiled
+def _bend(
+    steps: np.ndarray,
+    p: Floats,
+    s: Floats,
+    w: Floats,
+    first: int,
+    total: float,
+    level: float,
+    weights: Floats,
+    reaches: Floats,
+    held: Floats,
+) -> None:
+    """Put into `held` (N/(N/m)) of each stop element what a little more of it does to the bent whole.
+
+    The bent force is in proportion to all weights together, so their products with these sum up to it, and a
+    fit of them converges even where its branches are far from those of the weights at hand. The effect `first`
+    bends the whole, `total` (N) at `level` (N); those after it the whole with more of one element each.
+    """
+    count = weights.size
+    w[GRIP], w[GRIP_LEVEL], w[FRICTION] = total, level, total
+    run_chain(steps, p, s, w, first, first + 1)
+    whole = rest = w[GRIP]
+    for i in range(count):
+        more = MORE * level / reaches[i]
+        w[GRIP], w[GRIP_LEVEL] = total + more * held[i], level + more * reaches[i]
+        run_chain(steps, p, s, w, first + 1 + i, first + 2 + i)
+        held[i] = (w[GRIP] - whole) / more
+        rest -= weights[i] * held[i]
+    for i in range(count):  # what is missing of the whole is the rounding of these differences
+        held[i] += rest * reaches[i] / level
+    w[GRIP], w[GRIP_LEVEL], w[FRICTION] = whole, level, whole

@@ -51,7 +51,7 @@ def screen(
     ledger, seen = fitted.ledger, fitted.ledger.seen
     # An entry that shrinks the drive side shrinks every error; all are stated for the believed drive.
     power = float(fitted.system.blocks.power[seen].sum())
-    best: dict[tuple[str, *tuple[bool, ...]], Screened] = {}
+    best: dict[tuple[object, ...], Screened] = {}
     others = [effect_of(e) for e in effects]
     all_searches = list(searches(scene))
     for number, search in enumerate(all_searches):

@@ -38,8 +38,8 @@ def non_congruent_friction(p: Floats, s: Floats, w: Floats) -> None:
 class AsymmetricFriction(Effect):
     """Presliding that is stiffer forward than backward, up to the same level: of two kinds.
 
-    With `closing` 0 stop elements are stiffer when they are loaded forward, at equal yield force: the friction
-    model sees displacements (1 + asymmetry) times as long forward and (1 - asymmetry) times backward; so the
+    With `closing` 0 stop elements are stiffer when loaded forward, at equal yield force: the friction model
+    sees displacements (1 + asymmetry) times as long forward and (1 - asymmetry) times backward; so the
     levels of sliding are alike (a difference of those is `constant-force`, from which no motion that slides
     both ways can tell it), and every model takes part.
 
@@ -59,7 +59,9 @@ class AsymmetricFriction(Effect):
     place = Place.FRICTION
     parameters = (
         ASYMMETRY,
-        Parameter("closing", "1", 0.0, 1.0, "1: every loop closes, 0: small ones move to the stiffer side", 0.0),
+        Parameter(
+            "closing", "1", 0.0, 1.0, "1: every loop closes, 0: small ones move to the stiffer side", 0.0
+        ),
     )
     kernel = asymmetric_friction
     says = "presliding is stiffer in one direction than in the other, up to the same level"

@@ -27,7 +27,7 @@ _SLIDES, _LEAST = 1.0 - 1e-9, 1e-12
 @compiled
 def rise(part: float, exponent: float) -> float:
     """Return how far a branch has come, 0 to 1, where the model's own has come by `part`."""
-    return 1.0 - (1.0 - min(max(part, 0.0), 1.0)) ** exponent
+    return float(1.0 - (1.0 - min(max(part, 0.0), 1.0)) ** exponent)
 
 
 @compiled
