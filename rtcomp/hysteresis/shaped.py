@@ -23,7 +23,8 @@ congruent; output makes them non-congruent, as Kuhnen's dead zones do.
 they reach the operator, which is then stiffer in one direction, up to the same level. A small loop does not
 close then: it ratchets towards the stiffer side until everything slides there, which bounds it, and closes
 from then on. It is 0 unless asked for. Motion back and forth within `grain`, the noise of the position, has
-no direction: it would ratchet without end.
+no direction: it would ratchet without end. A turn counts neither way until it has gone twice the grain; then
+it was no noise, and all of the way since counts.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ def integral(q: float, point: float, spacing: float) -> float:
 @basis_kernel
 def shaped_interval_operator(p: Floats, s: Floats, x: Floats, u: float) -> None:
     """p: N, widths (m), then the places above. s: the interval operator's, the last input (m), the
-    place within the grain (m).
+    place within the grain (m), the direction of motion beyond it (1; 0 before there was any).
 
     x: xi_i, reversible, cells, output (m). A step costs all intervals and all that is added.
     """
@@ -80,9 +81,16 @@ def shaped_interval_operator(p: Floats, s: Floats, x: Floats, u: float) -> None:
     s[last] = u
     if step == 0.0:
         return
+    grain = p[at + GRAIN]
     inside = s[last + 1] + step
-    s[last + 1] = min(max(inside, -p[at + GRAIN]), p[at + GRAIN])
-    step += p[at + SKEW] * abs(inside - s[last + 1])
+    s[last + 1] = min(max(inside, -grain), grain)
+    travel = inside - s[last + 1]
+    if travel != 0.0:
+        direction = 1.0 if travel > 0.0 else -1.0
+        if s[last + 2] != direction:  # no noise turns so far: the way since the turn was motion
+            travel += direction * (grain - s[last + 2] * direction * grain)
+            s[last + 2] = direction
+        step += p[at + SKEW] * abs(travel)
     s[INPUT] = 0.0  # the operator sees displacements, so that a skewed one accumulates nothing
     advance(p, s, x, step)
     z = 0.0
@@ -237,7 +245,7 @@ class ShapedIntervalBasis(Basis):
 
     def initial_state(self) -> Floats:
         """Return the anhysteretic state (5): every interval half activated."""
-        return np.concatenate([np.zeros(AMOUNTS), self.widths / 2, [0.0, 0.0]])
+        return np.concatenate([np.zeros(AMOUNTS), self.widths / 2, np.zeros(3)])
 
     def scales(self) -> Floats:
         """Return half the widths, and half the mean width for each that the parts add (m)."""

@@ -40,6 +40,8 @@ _ROUNDS = 2
 """Times that the shape of the output is taken from the weights just learned."""
 _T = {2: 6.31, 3: 2.92, 4: 2.35, 5: 2.13, 6: 2.02, 7: 1.94, 8: 1.89, 9: 1.86, 10: 1.83}
 """Student's t, one-sided 95 %, by the number of blocks."""
+_SIGNS = 5
+"""Blocks from which being worse in every one is significant by itself: 2^-5 is below 5 % (sign test)."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,11 @@ class Candidate:
     def rms(self) -> float:
         """Error (N) over all blocks held out."""
         return float(np.sqrt(self.squares.mean()))
+
+    @property
+    def typical(self) -> float:
+        """Geometric mean (N) over the blocks: one that errs much has no more say than the others."""
+        return float(np.exp(0.5 * np.log(np.maximum(self.squares, 1e-300)).mean()))
 
     def __str__(self) -> str:
         """Name it as a person would."""
@@ -120,7 +127,8 @@ def smallest_that_pays(candidates: Sequence[Candidate]) -> int:
         worse = 0.5 * np.log(np.maximum(candidates[i].squares, 1e-300) / np.maximum(best.squares, 1e-300))
         count = worse.size
         doubt = _T.get(count, 1.8) * float(worse.std(ddof=1)) / np.sqrt(count) if count > 1 else 0.0
-        if worse.mean() <= max(doubt, LEAST_GAIN):
+        always = count >= _SIGNS and bool((worse > 0.0).all())
+        if worse.mean() <= (LEAST_GAIN if always else max(doubt, LEAST_GAIN)):
             return i
     return candidates.index(best)
 
@@ -171,7 +179,7 @@ def that_pays(
     rows = friction.time <= window[1]
     good = friction.good & (friction.time >= window[0])
     sensor = config.stage.sensor
-    grain = sensor.resolution + NOISE_COUNTS * sensor.noise
+    grain = 0.5 * (sensor.resolution + NOISE_COUNTS * sensor.noise)  # to either side
     motion = Motion(friction.position[rows], friction.force[rows], good[rows], config.identify.gate, grain)
     choice = choose(plain, config.learner(), motion)
     if isinstance(choice.model.basis, IntervalBasis):
@@ -249,7 +257,7 @@ def _best_skew(
 
     def square(skew: float) -> float:
         tried = [_judged(plain.widths, p, skew, learner, motion, rows, halves) for p in ((), ("output",))]
-        return min(c.rms for c in tried) ** 2
+        return min(c.typical for c in tried) ** 2
 
     at = min(_SKEWS, key=square)
     least, step = square(at), float(_SKEWS[1] - _SKEWS[0])

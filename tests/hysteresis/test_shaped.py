@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
@@ -102,6 +102,17 @@ def test_noise_within_the_grain_does_not_ratchet():
         apart = np.abs(regressors(basis, noisy)[:, 1:] - regressors(basis, clean)[:, 1:]).max()
         ends.append(apart)
     assert ends[1] < 0.02 < 0.1 < ends[0]
+
+
+@pytest.mark.parametrize("skew", [0.2, -0.2])
+def test_a_grain_takes_no_way_from_turns_that_leave_it(skew):
+    """Only while it is in doubt does a turn count neither way: once it is certain all of it has counted."""
+    u = np.array([0.0, 0.5, -0.3, 0.9, 0.1, 1.4, -1.2, 0.4, 0.2, 0.7])
+    fine = np.concatenate([u[:1], *(np.linspace(*ends, 101)[1:] for ends in pairwise(u))])
+    bases = (ShapedIntervalBasis.over(6, 2.0, parts=[], skew=skew, grain=g) for g in (0.0, 0.05))
+    exact, grained = (regressors(b, fine) for b in bases)
+    assert np.allclose(exact[100::100], grained[100::100], rtol=0, atol=1e-12)
+    assert np.abs(exact - grained).sum(axis=1).max() < 1.01 * abs(skew) * 0.1
 
 
 @settings(max_examples=40, deadline=None)

@@ -76,6 +76,19 @@ def test_the_smallest_whose_error_is_not_significantly_worse():
     assert smallest_that_pays([plain, Candidate(("output",), 0.0, 10, 0.98 * base)]) == 0
 
 
+def test_worse_in_every_block_is_worse_whatever_the_scatter():
+    base = np.ones(6)
+    plain = Candidate((), 0.1, 8, base * np.array([6.0, 1.2, 1.2, 1.2, 1.2, 1.2]))
+    assert smallest_that_pays([plain, Candidate(("output",), 0.1, 10, base)]) == 1
+    seldom = Candidate((), 0.1, 8, base * np.array([6.0, 1.2, 1.2, 0.9, 1.2, 1.2]))
+    assert smallest_that_pays([seldom, Candidate(("output",), 0.1, 10, base)]) == 0
+
+
+def test_a_block_that_errs_much_has_no_more_say_in_the_skew_than_others():
+    usual, other = (Candidate((), s, 8, np.array(e)) for s, e in ((0.1, [9.0, 1.0]), (0.2, [6.0, 2.0])))
+    assert usual.typical < other.typical and usual.rms > other.rms
+
+
 def test_auto_in_a_configuration_chooses_and_notes():
     from rtcomp.jobs.identify import identify
 
