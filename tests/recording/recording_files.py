@@ -1,4 +1,4 @@
-"""Recordings for tests, in every format, and where the measured ones are."""
+"""Recordings for tests, in every format, where the measured ones are, and how one is refused."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from scipy.io import savemat
+
+from rtcomp.errors import RecordingError
+from rtcomp.recording.reader import read
 
 Floats = npt.NDArray[np.float64]
 DATA = Path(__file__).parents[3] / "shared" / "data"
@@ -96,3 +99,11 @@ def write_any(path: Path, columns: Mapping[str, Floats]) -> Path:
 
 
 FORMATS = ["a.csv", "a.csv.gz", "a.mat", "a.73.mat", "a.h5"]
+
+
+def refusal(path: Path, *arguments: object, **options: object) -> str:
+    """The one line with which reading `path` is refused."""
+    with pytest.raises(RecordingError) as caught:
+        read(path, *arguments, **options)  # type: ignore[arg-type]
+    assert "\n" not in str(caught.value) and str(path) in str(caught.value)
+    return str(caught.value)
