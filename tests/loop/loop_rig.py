@@ -35,6 +35,10 @@ WIDTHS = [4e-6, 8e-6, 1.6e-5, 2.4e-5]
 WEIGHTS = [3.2e5, 1.6e5, 8e4, 3e4]
 MASS, CONSTANT, VISCOUS = 2.0, 4.0, 8.0
 GAINS = (2e4, 2e5, 100.0)
+TICKS = 400
+"""Of most runs."""
+AT = 250
+"""The tick at which something goes wrong in them."""
 
 
 def stage(rate=1000.0, noise=0.0):
@@ -209,3 +213,17 @@ def go(the_device, the_tick, the_plan, clock=None, error=None, **options):
     rows = ring.take()
     ring.release()
     return Left(outcome, ring, rows, the_device, the_tick)
+
+
+def ended_safely(left):
+    names = [name for name, _ in left.device.calls]
+    assert names[0] == "open" and names[-1] == "close" and names.count("close") == 1
+    assert left.device.commands[-1] == 0.0
+    assert names[-2] == "exchange"
+    assert max(abs(v) for v in left.device.commands) > 0.5  # it did drive before
+    assert np.array_equal(left.column("time"), 1e-3 * np.arange(len(left.rows)))
+
+
+def replaced(**change):
+    """Have an exchange's sample changed: what a `NotingDevice` takes."""
+    return lambda sample: sample._replace(**change)
