@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from free_mass import FreeMass
+from odrive_on_a_port import WATCHDOG
 from slcan_pty import Adapter, PtyAxis
 
 
@@ -25,3 +26,8 @@ def pty_axis():
     yield make
     for axis in axes:
         axis.unplug()
+
+
+@pytest.fixture
+def axis(pty_axis):
+    return pty_axis(watchdog=WATCHDOG)

@@ -13,6 +13,7 @@ import time
 
 import can
 import pytest
+from refusals import in_one_line
 from rtcomp_drivers import can_link
 from rtcomp_drivers.can_link import CanLink, CanSettings, check_interface, check_socketcan, configured
 from slcan_pty import Adapter
@@ -38,14 +39,7 @@ def message(identifier=0x29, data=b"\x01\x02", **more):
 
 
 def refused(error_type, *words, **settings):
-    with pytest.raises(error_type) as caught:
-        link(**settings)
-    assert type(caught.value) is error_type
-    text = str(caught.value)
-    assert "\n" not in text
-    for word in words:
-        assert word in text
-    return text
+    return in_one_line(error_type, words, lambda: link(**settings))
 
 
 def test_frames_go_out_and_come_in(open_link, adapter):

@@ -50,3 +50,13 @@ def made():
     yield Made
     for thing in reversed(everything):
         thing.end()
+
+
+@pytest.fixture
+def drive(made):
+    return made.axis()
+
+
+@pytest.fixture
+def driver(made, drive):
+    return made.driver(drive)

@@ -1,4 +1,4 @@
-"""Drives on python-can's virtual bus, each in a thread: our simulated axis, and canopen's LocalNode."""
+"""Drives on python-can's virtual bus, each in a thread: our simulated axis, canopen's LocalNode; or none."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from canopen.profiles.p402 import State402
 from free_mass import FreeMass
 from rtcomp_drivers.cia402_axis import Cia402Axis
 from rtcomp_drivers.cia402_memory import AxisFacts
+from rtcomp_drivers.driver import Bench
+from rtcomp_drivers.registry import create
 from rtcomp_drivers.slcan import Frame
 
 _NUMBER = itertools.count()
@@ -21,6 +23,12 @@ _NUMBER = itertools.count()
 def channel():
     """The name of a bus that nobody else has."""
     return f"cia402-{next(_NUMBER)}"
+
+
+def in_vain(period=1e-3, **settings):
+    """A call that builds a driver whose settings are to be refused before any bus is touched."""
+    settings = {"driver": "cia402", "interface": "virtual", "channel": "nobody", "node": 5, **settings}
+    return lambda: create(settings, Bench(period=period))
 
 
 class AxisOnBus:

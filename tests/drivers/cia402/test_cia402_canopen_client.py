@@ -8,11 +8,7 @@ import canopen
 import pytest
 from canopen.profiles.p402 import BaseNode402
 from rtcomp_drivers.cia402_objects import EDS
-
-
-@pytest.fixture
-def drive(made):
-    return made.axis()
+from waiting import wait
 
 
 @pytest.fixture
@@ -26,13 +22,6 @@ def node(drive):
     if network.sync._task is not None:
         network.sync.stop()
     network.disconnect()
-
-
-def wait(condition, seconds=5.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 def prepare(node):
