@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from every_effect import every
 
 from rtcomp import physics
 from rtcomp.physics import Place
@@ -15,7 +16,6 @@ from rtcomp.stage.balance import force_balance
 from rtcomp.stage.simulate import Simulator
 from rtcomp.stage.stage import Stage
 
-ENTRIES = list(physics.entries())
 MODELS = {"maxwell-slip", "dahl", "lugre", "gms", "leuven", "modified-leuven"}
 UNSEEN = {
     "sensor-noise": "noise of a reading is not undone: there is nothing to balance without it",
@@ -69,7 +69,7 @@ def recorded(stage: Stage, seconds: float = 6.0) -> tuple[np.ndarray, np.ndarray
     return t, position, voltage
 
 
-@pytest.mark.parametrize("entry", ENTRIES, ids=[e.name for e in ENTRIES])
+@every
 def test_the_balance_is_that_of_the_simulation(entry: type[physics.Effect]) -> None:
     if entry.name in UNSEEN:
         pytest.skip(UNSEEN[entry.name])

@@ -1,4 +1,4 @@
-"""What every entry of the catalogue promises, tested on each by itself, third parties' included.
+"""What every entry of the catalogue does, tested on each by itself, third parties' included.
 
 An entry needs nothing here: its `example` shows it within the motion below, the rest is read from its class.
 """
@@ -6,11 +6,10 @@ An entry needs nothing here: its `example` shows it within the motion below, the
 from __future__ import annotations
 
 import copy
-import math
-import re
 
 import numpy as np
 import pytest
+from every_effect import ENTRIES, every, example, pick, put
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
@@ -38,59 +37,7 @@ from rtcomp.physics.wires import (
     VOLTS,
 )  # fmt: skip
 
-ENTRIES = list(physics.entries())
-every = pytest.mark.parametrize("entry", ENTRIES, ids=[e.name for e in ENTRIES])
 SIGNALS = [VOLTS, DRIVE, PUSH, FRICTION, MASS, GAIN, SENSED]
-
-# FORMATS.md, "The effects, by name": parameters and units, those that may be left out in brackets.
-VOCABULARY = {
-    "drive": {
-        "drive-offset": "offset (V)",
-        "drive-gain": "gain (1)",
-        "drive-deadband": "width (V)",
-        "drive-saturation": "limit (V)",
-        "drive-delay": "delay (s)",
-        "drive-lag": "time_constant (s)",
-        "back-emf": "coefficient (N s/m)",
-        "torque-ripple": "amplitude (1), period (m), phase (rad)",
-        "cogging": "amplitude (N), period (m), phase (rad)",
-    },
-    "mechanics": {
-        "inertia": "mass (kg)",
-        "parallel-spring": "stiffness (N/m), cubic (N/m^3)",
-        "gravity": "force (N), amplitude (N m), phase (rad)",
-        "end-stop": "position (m), stiffness (N/m)",
-        "backlash": "gap (m), share (1), contact (Hz)",
-        "resonance": "frequency (Hz), damping (1), mass_ratio (1)",
-    },
-    "friction": {
-        "viscous-friction": "coefficient (N s/m)",
-        "quadratic-drag": "coefficient (N s^2/m^2)",
-        "asymmetric-friction": "asymmetry (1), closing (1)",
-        "asymmetric-viscous-friction": "ratio (1)",
-        "stribeck": "rise (1), velocity (m/s), stiffening (1), following (1)",
-        "position-dependent-friction": "amplitude (1), period (m), phase (rad), slope (1/m), "
-        "stiffening (1), following (1)",
-        "load-dependent-friction": "coefficient (1), external (1), stiffening (1), following (1)",
-        "non-congruent-friction": "softening (1)",
-        "frictional-lag": "time_constant (s), stiffening (1), following (1)",
-        "stiction-ageing": "growth (1), distance (m), onset (s), stiffening (1), following (1)",
-        "friction-drift": "change (1), time_constant (s)",
-        "creep": "fraction (1), time_constant (s)",
-    },
-    "sensor": {
-        "sensor-scale": "scale (1)",
-        "sensor-delay": "delay (s)",
-        "sensor-periodic-error": "amplitude (m), period (m), phase (rad)",
-        "sensor-drift": "drift (m), time_constant (s)",
-        "sensor-jump": "size (m), time (s)",
-    },
-    "disturbance": {
-        "tonal-disturbance": "amplitude (N), frequency (Hz), phase (rad)",
-        "constant-force": "force (N)",
-    },
-    "open": {"position-force": ""},
-}
 
 
 def motion(seed: int = 0) -> np.ndarray:
@@ -121,10 +68,6 @@ def signals(*effects, rows=MOTION):
     return over_rows(chain_of(*effects), rows.copy())[:, SIGNALS]
 
 
-def example(entry, **changes):
-    return entry.from_dict({**entry.example, **changes})
-
-
 def leaves(tree, path=()):
     """Paths of all numbers in an entry's dictionary."""
     if isinstance(tree, dict):
@@ -132,59 +75,6 @@ def leaves(tree, path=()):
     if isinstance(tree, list):
         return [leaf for i, value in enumerate(tree) for leaf in leaves(value, (*path, i))]
     return [path] if isinstance(tree, int | float) else []
-
-
-def pick(tree, path):
-    for key in path:
-        tree = tree[key]
-    return tree
-
-
-def put(tree, path, value):
-    tree = copy.deepcopy(tree)
-    pick(tree, path[:-1])[path[-1]] = value
-    return tree
-
-
-@every
-def test_text_is_complete(entry):
-    for field in ("says", "equation", "source", "signature", "experiment"):
-        text = getattr(entry, field)
-        assert text == text.strip() and text, field
-        assert not text.endswith("."), f"{field} stands inside sentences"
-        assert "TODO" not in text
-    for field in ("says", "signature", "experiment"):
-        assert len(getattr(entry, field).split()) >= 3, field
-    assert "=" in entry.equation or "<-" in entry.equation
-    assert entry.__doc__ and entry.__doc__.strip().endswith(".")
-    for parameter in (*entry.parameters, *entry.element):
-        assert re.fullmatch(r"[a-z]+(_[a-z]+)*", parameter.name)
-        assert parameter.unit and parameter.says.strip()
-        assert math.isfinite(parameter.low) and math.isfinite(parameter.high)
-        assert parameter.low < parameter.high
-        if parameter.default is not None:
-            assert parameter.check(parameter.default, entry.name) == parameter.default
-
-
-@every
-def test_name_and_parameters_are_those_of_the_vocabulary(entry):
-    assert re.fullmatch(r"[a-z]+(-[a-z]+)*", entry.name)
-    assert physics.entry(entry.name) is entry
-    assert isinstance(entry.place, Place)
-    for place, effects in VOCABULARY.items():
-        if entry.name in effects:
-            assert place in (entry.place.name.lower(), "open")
-            assert ", ".join(f"{p.name} ({p.unit})" for p in entry.parameters) == effects[entry.name]
-
-
-def test_names_are_unique_and_a_wrong_one_finds_the_nearest():
-    assert len({e.name for e in ENTRIES}) == len(ENTRIES)
-    with pytest.raises(ConfigError, match="no effect is named 'coging'; did you mean 'cogging'"):
-        physics.build({"name": "coging"})
-    with pytest.raises(ConfigError, match="needs a name"):
-        physics.build({"amplitude": 1.0})
-    with pytest.raises(ValueError, match="already has"):
-        physics.register(ENTRIES[0])
 
 
 @every
@@ -215,65 +105,6 @@ def test_the_kernel_in_python_is_the_compiled_one(entry):
             kernel(p, fast, theirs)
             np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-15)
         np.testing.assert_allclose(plain, fast, rtol=1e-9, atol=1e-15)
-
-
-@every
-def test_it_goes_through_its_dictionary_unchanged(entry):
-    effect = example(entry)
-    text = effect.to_dict()
-    assert text["name"] == entry.name
-    again = physics.build(text)
-    assert type(again) is entry
-    assert again == effect
-    assert again.to_dict() == text
-    np.testing.assert_array_equal(again.vector(), effect.vector())
-    assert type(effect).__name__ in repr(effect)
-
-
-def wrong_values(parameter):
-    yield math.nan
-    yield math.inf
-    yield -math.inf
-    yield parameter.high * 2
-    yield parameter.low if parameter.open_low else parameter.low - max(1.0, abs(parameter.low))
-
-
-@every
-def test_wrong_values_are_refused_by_name_value_and_range(entry):
-    text = example(entry).to_dict()
-    places = [((p.name,), p) for p in entry.parameters]
-    if entry.element:
-        list_name = next((key for key, value in text.items() if isinstance(value, list)), None)
-        if list_name:
-            places += [((list_name, 0, p.name), p) for p in entry.element]
-    for path, parameter in places:
-        for value in wrong_values(parameter):
-            with pytest.raises(ConfigError) as caught:
-                physics.build(put(text, path, value))
-            message = str(caught.value)
-            assert parameter.name in message and f"{value:g}" in message
-            assert f"{parameter.low:g}, {parameter.high:g}]" in message
-            assert "\n" not in message
-        for value in ("many", None, True, [1.0]):
-            with pytest.raises(ConfigError, match=parameter.name):
-                physics.build(put(text, path, value))
-        misspelt = put(text, path, None)
-        pick(misspelt, path[:-1]).pop(path[-1])
-        pick(misspelt, path[:-1])[parameter.name + "x"] = 1.0
-        with pytest.raises(ConfigError, match=f"unknown parameter '{parameter.name}x'.*{parameter.name}"):
-            physics.build(misspelt)
-
-
-@every
-def test_a_missing_parameter_is_named(entry):
-    for parameter in entry.parameters:
-        text = example(entry).to_dict()
-        del text[parameter.name]
-        if parameter.default is None:
-            with pytest.raises(ConfigError, match=rf"'{parameter.name}' \(.+\) is missing"):
-                physics.build(text)
-        else:
-            assert physics.build(text).values[parameter.name] == parameter.default
 
 
 @every
