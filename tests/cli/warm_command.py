@@ -1,6 +1,6 @@
-"""`rtcomp` without the half second of its imports: a process that has them forks a child for each command.
+"""`rtcomp` without its second of imports and of compiled kernels: a process that has them forks the commands.
 
-The child is what the installed script is: a process of its own with its own folder, files, signals, status.
+Each child is what the installed script is: a process of its own with its own folder, files, signals, status.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -92,15 +93,34 @@ def become(request: dict[str, Any]) -> None:
     sys.argv = ["rtcomp", *request["arguments"]]
 
 
+def load_kernels() -> None:
+    """Do the jobs once, in memory and in virtual time: what is compiled then, or read, no child need."""
+    motion = {"reference": {"kind": "triangle", "amplitude": 6e-5, "frequency": 2.0, "duration": 2.0}}
+    config = Configuration.load(shipped("leuven.yaml")).changed(**motion, judge=motion, compensate=motion)
+    compensate(config, identify(config).model)
+    assert threading.active_count() == 1, "a thread would not be there in a fork"
+
+
 if __name__ == "__main__":
     sys.path.pop(0)  # this folder, which the script does not have
+    import narwhals  # noqa: F401  # of plotly, which asks for it as late as a figure is made
+
     import rtcomp.diagnosis.diagnose
     import rtcomp.jobs.compensate
+    import rtcomp.jobs.inspect
+    import rtcomp.jobs.replay
     import rtcomp.jobs.simulate
     import rtcomp.recording.reader
-    import rtcomp.recording.recorder  # noqa: F401
+    import rtcomp.recording.recorder
+    import rtcomp.report.pages
+    import rtcomp.report.watch  # noqa: F401
     from rtcomp.cli.main import main
+    from rtcomp.jobs.compensate import compensate
+    from rtcomp.jobs.configuration import Configuration
+    from rtcomp.jobs.demo import shipped
+    from rtcomp.jobs.identify import identify
 
+    load_kernels()
     asked = serve()
     if asked is not None:
         become(asked)
