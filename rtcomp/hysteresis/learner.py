@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from rtcomp.errors import ConfigError, nearest
 from rtcomp.hysteresis.basis import Basis
@@ -123,20 +124,32 @@ def learn(
 
 
 def learn_places(
-    basis: Basis, learner: Learner, inputs: Floats, outputs: Floats, gate: float = 0.0
+    basis: Basis,
+    learner: Learner,
+    inputs: Floats,
+    outputs: Floats,
+    gate: float = 0.0,
+    counted: npt.NDArray[np.bool_] | None = None,
+    offset: bool = False,
 ) -> tuple[Basis, Floats]:
     """Learn as `learn` does with a basis whose elements move; return it as it ends, and the weights (size,).
 
-    Raises ConfigError where the learner cannot follow.
+    Samples that are not `counted` (K,) are moved through, and nothing is learned of them, neither weights nor
+    places. With `offset` a constant is learned too, as the loop does; its weight (of the mean scale, m) is
+    then the last of size + 1. Raises ConfigError where the learner cannot follow.
     """
-    scales, w = basis.scales().copy(), np.zeros(basis.size)
+    scales, x = basis.scales().copy(), np.zeros(basis.size + offset)
+    if offset:
+        x[-1] = scales.mean()
+        scales = np.append(scales, x[-1])
     vector, params, state = basis.vector(), learner.vector(scales), learner.initial_state(scales)
     moving, follow = followed(basis, learner)
+    w = np.zeros(x.size)
     _learn_places(
         basis.kernel.address, vector, basis.initial_state(), learner.kernel.address, params, state,
-        np.zeros(basis.size), w, np.ascontiguousarray(inputs, dtype=np.float64),
+        x, w, np.ascontiguousarray(inputs, dtype=np.float64),
         np.ascontiguousarray(outputs, dtype=np.float64), gate, moving, follow, scales, basis.memory(gate),
-        np.zeros(CHANGE_WIDTH),
+        np.zeros(CHANGE_WIDTH), np.ones(inputs.size, dtype=np.bool_) if counted is None else counted,
     )  # fmt: skip
     return basis.settled(vector), w
 
@@ -161,22 +174,22 @@ def followed(basis: Basis, learner: Learner) -> tuple[int, int]:
 def _learn_places(
     basis: int, bp: Floats, bs: Floats, learner: int, lp: Floats, ls: Floats, x: Floats, w: Floats,
     inputs: Floats, outputs: Floats, gate: float, moving: int, follow: int, scales: Floats, memory: Floats,
-    change: Floats,
+    change: Floats, counted: npt.NDArray[np.bool_],
 ) -> None:  # fmt: skip
     last, begun = inputs[0], w.copy()
     for k in range(inputs.size):
         call_basis(basis, bp.ctypes.data, bs.ctypes.data, x.ctypes.data, inputs[k])
-        error = np.nan
-        if abs(inputs[k] - last) >= gate:
+        error, force = np.nan, outputs[k] if counted[k] else np.nan
+        if counted[k] and abs(inputs[k] - last) >= gate:
             last = inputs[k]
-            error = outputs[k] - np.dot(w, x)
+            error = force - np.dot(w, x)
             call_learner(learner, lp.ctypes.data, ls.ctypes.data, x.ctypes.data, w.ctypes.data, error)
         if moving == 0:
             continue
         call_placing(
             moving, bp.ctypes.data, bs.ctypes.data, x.ctypes.data, bs.ctypes.data, x.ctypes.data,
             w.ctypes.data, begun.ctypes.data, scales.ctypes.data, memory.ctypes.data, change.ctypes.data,
-            outputs[k], error,
+            force, error,
         )  # fmt: skip
         if change[CHANGED] > 0.0:
             call_regroup(follow, lp.ctypes.data, ls.ctypes.data, scales.ctypes.data, change.ctypes.data)

@@ -10,15 +10,12 @@ import numpy as np
 
 from rtcomp.control.references import Reference
 from rtcomp.errors import Interrupted, RecordingError
-from rtcomp.hysteresis.basis import regressors
-from rtcomp.hysteresis.beyond import continued, passes
-from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.model import HysteresisModel
-from rtcomp.hysteresis.prior import non_increasing
 from rtcomp.hysteresis.shaped import ShapedIntervalBasis
 from rtcomp.jobs.arming import permit
 from rtcomp.jobs.configuration import Configuration
-from rtcomp.jobs.judge import Friction, Judgement, friction_of, judge, learning_curve, reached
+from rtcomp.jobs.judge import Friction, Judgement, friction_of, judge, learning_curve
+from rtcomp.jobs.known import completed
 from rtcomp.jobs.lead import NOTHING, lead_volts
 from rtcomp.jobs.motion_notes import motion_notes
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
@@ -209,19 +206,10 @@ def learned_positions(config: Configuration, run: Run) -> Floats:
 
 def model_of(config: Configuration, tick: Tick, positions: Floats) -> HysteresisModel:
     """Take the weights out of a tick, with the prior applied, as a model."""
-    weights = tick.weights.copy()
-    basis = tick.settled_basis
-    if config.identify.prior == "non-increasing" and isinstance(basis, IntervalBasis):
-        information = tick.learner.information(tick.identifier.ls, tick.scales)
-        weights = non_increasing(weights, information, free=1)
-    part = reached(basis, positions)
-    weights[:-1][part == 0.0] = 0.0
-    if config.identify.beyond == "continue" and isinstance(basis, IntervalBasis | ShapedIntervalBasis):
-        n, cut = basis.widths.size, config.identify.smoothing
-        slow = zero_phase(positions, cut, 1.0 / config.period) if cut > 0.0 else positions
-        passed = passes(regressors(basis, slow)[:, :n], basis.widths)
-        weights[:n] = continued(weights[:n], basis.widths, passed)[0]
-    return HysteresisModel(basis, weights[:-1], weights[-1] * tick.offset_scale, part)
+    return completed(
+        config.identify, tick.settled_basis, tick.weights, tick.offset_scale, positions, config.period,
+        lambda: tick.learner.information(tick.identifier.ls, tick.scales),
+    )  # fmt: skip
 
 
 def _from_recording(

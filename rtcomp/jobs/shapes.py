@@ -4,12 +4,15 @@ Each candidate learns the recorded motion sample by sample, one block of it left
 with frozen weights on that block; its memory sees all of the motion. What is chosen is the smallest model
 whose error is not significantly above the best one's. A part that the motion says too little about is not
 tried. The symmetric operator is always among the candidates.
+
+Each shape is tried with the intervals of the configuration and with intervals placed by the motion itself
+(`placed`), found anew without each block held out. Boundaries that were found are counted as weights are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +23,9 @@ from rtcomp.hysteresis.learner import Learner
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.hysteresis.shaped import ShapedIntervalBasis
 from rtcomp.jobs.configuration import AUTO, Configuration
-from rtcomp.jobs.judge import Friction, reached
+from rtcomp.jobs.judge import Friction
+from rtcomp.jobs.known import completed
+from rtcomp.jobs.placed import Placed, placed
 from rtcomp.jobs.tick_settings import NOISE_COUNTS
 from rtcomp.kernels import Floats, call_learner, compiled
 
@@ -32,6 +37,7 @@ LADDER: tuple[tuple[str, ...], ...] = (
 BLOCKS = 6
 ROWS_A_WEIGHT = 20
 """Updates needed for each weight that is learned."""
+PLACED = "intervals placed"
 LEAST_GAIN = 0.02
 """Share of its error that a larger model must take away, significant or not."""
 _SKEWS = np.linspace(-0.4, 0.4, 9)
@@ -64,6 +70,18 @@ class Candidate:
     skew: float
     weights: int
     squares: Floats
+    places: int = 0
+    """Boundaries between intervals that the motion placed; 0 where they lie as configured."""
+
+    @property
+    def size(self) -> int:
+        """How many numbers were learned: weights and places."""
+        return self.weights + self.places
+
+    @property
+    def holds(self) -> str:
+        """Say how many numbers were learned."""
+        return f"{self.weights} weights" + (f" and {self.places} places" if self.places else "")
 
     @property
     def rms(self) -> float:
@@ -77,7 +95,8 @@ class Candidate:
 
     def __str__(self) -> str:
         """Name it as a person would."""
-        added = [*self.parts, *([f"skew {self.skew:+.3g}"] if self.skew else [])]
+        added = [*([PLACED] if self.places else []), *self.parts]
+        added += [f"skew {self.skew:+.3g}"] if self.skew else []
         return " + ".join(["symmetric", *added])
 
 
@@ -87,6 +106,8 @@ class Choice:
 
     model: HysteresisModel
     chosen: Candidate
+    information: Floats
+    """What the data say of each combination of its weights and offset, (size + 1, size + 1)."""
     tried: list[Candidate] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
@@ -102,11 +123,18 @@ def _learn_rows(
 
 def learned(basis: Basis, learner: Learner, x: Floats, force: Floats, rows: npt.NDArray[np.int64]) -> Floats:
     """Return weights (size + 1,) learned from regressors (K, size + 1) and force (N, (K,)) row by row."""
+    return _learned(basis, learner, x, force, rows)[0]
+
+
+def _learned(
+    basis: Basis, learner: Learner, x: Floats, force: Floats, rows: npt.NDArray[np.int64]
+) -> tuple[Floats, Floats]:
+    """Return the weights, and the learner's state then."""
     scales = np.append(basis.scales(), x[0, -1])
     w = np.zeros(x.shape[1])
     vector, state = learner.vector(scales), learner.initial_state(scales)
     _learn_rows(learner.kernel.address, vector, state, x, force, rows, w)
-    return w
+    return w, state
 
 
 def with_offset(basis: Basis, position: Floats) -> Floats:
@@ -116,14 +144,15 @@ def with_offset(basis: Basis, position: Floats) -> Floats:
 
 
 def smallest_that_pays(candidates: Sequence[Candidate]) -> int:
-    """Return the place of the candidate with the fewest weights whose error is not significantly the worse.
+    """Return the index of the smallest candidate whose error is not significantly the worse.
 
+    Of equal size, intervals as configured come first, then what has no skew.
     Paired over the blocks held out, by the logarithm of the error, for blocks differ in how much moves in
     them: one-sided 95 % against the best, and never for less than 2 % of the error.
     """
     best = min(candidates, key=lambda c: c.rms)
-    order = sorted(range(len(candidates)), key=lambda i: (candidates[i].weights, bool(candidates[i].skew)))
-    for i in order:
+    ranks = [(c.size, c.places, bool(c.skew)) for c in candidates]
+    for i in sorted(range(len(candidates)), key=lambda i: ranks[i]):
         worse = 0.5 * np.log(np.maximum(candidates[i].squares, 1e-300) / np.maximum(best.squares, 1e-300))
         count = worse.size
         doubt = _T.get(count, 1.8) * float(worse.std(ddof=1)) / np.sqrt(count) if count > 1 else 0.0
@@ -140,29 +169,47 @@ def choose(plain: IntervalBasis, learner: Learner, motion: Motion, blocks: int =
     """
     rows = _gated(motion)
     parts_of_time = np.array_split(rows, blocks)
+    as_configured = Placed(plain.widths, (plain.widths,) * blocks)
+    lies: list[tuple[int, Placed]] = [(0, as_configured)]
     left: list[str] = []
     tried: list[Candidate] = []
     skew = (
         _best_skew(plain, learner, motion, rows, parts_of_time) if rows.size >= _needed(plain.size) else 0.0
     )
+    unmoved = ""
+    if rows.size >= _needed(2 * plain.size - 1) and plain.size > 1:
+        moved = placed(plain, learner, motion.position, motion.force, motion.good, motion.gate, parts_of_time)
+        if isinstance(moved, Placed):
+            lies.append((plain.size - 1, moved))
+        else:
+            unmoved = moved
+    elif plain.size > 1:
+        left.append(f"{PLACED} ({_needed(2 * plain.size - 1)})")
     for parts in LADDER:
-        basis = ShapedIntervalBasis(plain.widths, parts)
-        needed = _needed(basis.size)
-        if parts and rows.size < needed:
-            left.append(f"{' + '.join(parts)} ({needed})")
-            continue
-        for amount in dict.fromkeys((0.0, skew)):
-            tried.append(_judged(plain.widths, parts, amount, learner, motion, rows, parts_of_time))
+        for places, at in lies:
+            size = ShapedIntervalBasis(plain.widths, parts).size + places
+            if (parts or places) and rows.size < _needed(size):
+                left.append(f"{' + '.join([*([PLACED] if places else []), *parts])} ({_needed(size)})")
+                break
+            for amount in dict.fromkeys((0.0, skew)):
+                judged = _judged(at.without, parts, amount, learner, motion, rows, parts_of_time)
+                tried.append(replace(judged, places=places))
     chosen = tried[smallest_that_pays(tried)]
-    found, w = _fitted(plain.widths, chosen.parts, chosen.skew, learner, motion, rows)
+    widths = dict(lies)[chosen.places].widths
+    found, w, state = _fitted(widths, chosen.parts, chosen.skew, learner, motion, rows)
     notes = [_verdict(chosen, tried)]
+    if len(lies) > 1:
+        notes.append(_of_places(chosen, tried, plain.widths, widths))
+    if unmoved:
+        notes.append(f"intervals lie as configured: {unmoved}")
     if left:
         notes.append(
             f"left off for want of data, {rows.size} updates: {', '.join(left)}, in brackets how many it "
             "takes; record longer, make identify.gate smaller, or take fewer intervals"
         )
-    offset = float(w[-1] * found.scales().mean())
-    return Choice(HysteresisModel(found, w[:-1], offset), chosen, tried, notes)
+    scales = np.append(found.scales(), found.scales().mean())
+    model = HysteresisModel(found, w[:-1], float(w[-1] * scales[-1]))
+    return Choice(model, chosen, learner.information(state, scales), tried, notes)
 
 
 def that_pays(
@@ -170,33 +217,50 @@ def that_pays(
 ) -> tuple[HysteresisModel, list[str]]:
     """Return the model that ``identify: {model: auto}`` chooses on what was learned from, with notes.
 
-    That is `model`, the symmetric one that the loop has learned, unless a shape pays. `window` (s) is when
-    the weights might change. Any other ``identify.model`` is left as it is.
+    That is `model`, the symmetric one that the loop has learned, unless a shape or other places of its
+    intervals pay. `window` (s) is when the weights might change. Any other ``identify.model`` is left as it
+    is.
     """
-    plain = config.basis()
-    if config.identify.model != AUTO or not isinstance(plain, IntervalBasis):
+    plain, section = config.basis(), config.identify
+    if section.model != AUTO or not isinstance(plain, IntervalBasis):
         return model, []
     rows = friction.time <= window[1]
     good = friction.good & (friction.time >= window[0])
     sensor = config.stage.sensor
     grain = 0.5 * (sensor.resolution + NOISE_COUNTS * sensor.noise)  # to either side
-    motion = Motion(friction.position[rows], friction.force[rows], good[rows], config.identify.gate, grain)
+    motion = Motion(friction.position[rows], friction.force[rows], good[rows], section.gate, grain)
     choice = choose(plain, config.learner(), motion)
-    if isinstance(choice.model.basis, IntervalBasis):
+    basis, scale = choice.model.basis, choice.model.basis.scales().mean()
+    if isinstance(basis, IntervalBasis) and not choice.chosen.places:
         return model, choice.notes
-    part = reached(choice.model.basis, motion.position)
-    weights = np.where(part == 0.0, 0.0, choice.model.weights)
-    return HysteresisModel(choice.model.basis, weights, choice.model.offset, part), choice.notes
+    weights = np.append(choice.model.weights, choice.model.offset / scale)
+    complete = completed(
+        section, basis, weights, float(scale), motion.position, config.period, lambda: choice.information
+    )
+    return complete, choice.notes
 
 
 def _verdict(chosen: Candidate, tried: Sequence[Candidate]) -> str:
     best, plain = min(tried, key=lambda c: c.rms), tried[0]
     says = f"model {chosen}: held-out error {chosen.rms:.3g} N, the symmetric operator's {plain.rms:.3g} N"
     if best is not chosen:
-        says += (
-            f"; {best} has {best.rms:.3g} N with {best.weights} weights for {chosen.weights}: does not pay"
-        )
+        says += f"; {best} has {best.rms:.3g} N with {best.holds} for {chosen.holds}: does not pay"
     return says
+
+
+def _of_places(chosen: Candidate, tried: Sequence[Candidate], before: Floats, after: Floats) -> str:
+    """Say what placing the intervals of the chosen shape did, or would have done."""
+    if chosen.places:
+        return (
+            f"{PLACED} where the curve bends, {after.min():.3g} to {after.max():.3g} m wide; identify has "
+            f"them {before.min():.3g} to {before.max():.3g} m"
+        )
+    same = [c for c in tried if c.places and c.parts == chosen.parts and c.skew == chosen.skew]
+    if not same:
+        return f"{PLACED} not tried with {chosen}, for want of data"
+    return (
+        f"intervals lie as configured: placed ones have {same[0].rms:.3g} N, {chosen.rms:.3g} N as they lie"
+    )
 
 
 def _needed(weights: int) -> int:
@@ -216,30 +280,31 @@ def _gated(motion: Motion) -> npt.NDArray[np.int64]:
 def _fitted(
     widths: Floats, parts: tuple[str, ...], skew: float, learner: Learner, motion: Motion,
     rows: npt.NDArray[np.int64],
-) -> tuple[Basis, Floats]:  # fmt: skip
-    """Return the basis, the shape of its output taken from what it learned, and its weights."""
+) -> tuple[Basis, Floats, Floats]:  # fmt: skip
+    """Return the basis, the shape of its output as learned, its weights, and the state of the learner."""
     if not parts and not skew:
         plain = IntervalBasis(widths)
-        return plain, learned(plain, learner, with_offset(plain, motion.position), motion.force, rows)
+        return plain, *_learned(plain, learner, with_offset(plain, motion.position), motion.force, rows)
     grain = motion.grain if skew else 0.0
     basis = ShapedIntervalBasis(widths, parts, skew=skew, grain=grain)
-    w = learned(basis, learner, with_offset(basis, motion.position), motion.force, rows)
+    w, state = _learned(basis, learner, with_offset(basis, motion.position), motion.force, rows)
     for _ in range(_ROUNDS if "output" in parts else 0):
         slopes = w[: widths.size]
         if not float(slopes @ widths) > 0.0:
             break
         basis = ShapedIntervalBasis(widths, parts, skew=skew, grain=grain, shape=slopes)
-        w = learned(basis, learner, with_offset(basis, motion.position), motion.force, rows)
-    return basis, w
+        w, state = _learned(basis, learner, with_offset(basis, motion.position), motion.force, rows)
+    return basis, w, state
 
 
 def _judged(
-    widths: Floats, parts: tuple[str, ...], skew: float, learner: Learner, motion: Motion,
+    widths: Sequence[Floats], parts: tuple[str, ...], skew: float, learner: Learner, motion: Motion,
     rows: npt.NDArray[np.int64], blocks: Sequence[npt.NDArray[np.int64]],
 ) -> Candidate:  # fmt: skip
+    """Judge a model on each of the blocks, held out in turn; `widths` (m, (N,)) of its intervals for each."""
     squares = []
-    for block in blocks:
-        basis, w = _fitted(widths, parts, skew, learner, motion, np.setdiff1d(rows, block))
+    for own, block in zip(widths, blocks, strict=True):
+        basis, w, _ = _fitted(own, parts, skew, learner, motion, np.setdiff1d(rows, block))
         error = with_offset(basis, motion.position)[block] @ w - motion.force[block]
         squares.append(float(np.mean(error**2)))
     return Candidate(parts, skew, basis.size, np.array(squares))
@@ -256,7 +321,9 @@ def _best_skew(
     halves = [np.concatenate(blocks[k::2]) for k in (0, 1)]
 
     def square(skew: float) -> float:
-        tried = [_judged(plain.widths, p, skew, learner, motion, rows, halves) for p in ((), ("output",))]
+        tried = [
+            _judged([plain.widths] * 2, p, skew, learner, motion, rows, halves) for p in ((), ("output",))
+        ]
         return min(c.typical for c in tried) ** 2
 
     at = min(_SKEWS, key=square)

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.basis import regressors
 from rtcomp.hysteresis.interval import IntervalBasis
+from rtcomp.hysteresis.moving.self_placing import MOST_INTERVALS
 from rtcomp.hysteresis.rls import Rls
 from rtcomp.hysteresis.shaped import ShapedIntervalBasis
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
+from rtcomp.jobs.placed import placed
 from rtcomp.jobs.shapes import Candidate, Motion, choose, smallest_that_pays
 
 PLAIN = IntervalBasis.over(8, 2.0, 3.0)
@@ -89,6 +93,72 @@ def test_a_block_that_errs_much_has_no_more_say_in_the_skew_than_others():
     assert usual.typical < other.typical and usual.rms > other.rms
 
 
+def test_places_count_as_what_is_learned():
+    base = np.random.default_rng(0).uniform(0.5, 2.0, 6)
+    plain, lies = Candidate((), 0.0, 8, base), Candidate((), 0.0, 8, 0.98 * base, places=7)
+    assert smallest_that_pays([lies, plain]) == 1  # as configured, unless placed ones are clearly better
+    lies = replace(lies, squares=0.3 * base)
+    assert smallest_that_pays([plain, lies]) == 1
+    output = Candidate(("output",), 0.0, 10, 0.3 * base)
+    assert smallest_that_pays([plain, lies, output]) == 2
+    assert "8 weights and 7 places" in lies.holds and "intervals placed" in str(lies)
+
+
+BENDING = IntervalBasis.over(200, 2.0)
+BENT = np.exp(-np.cumsum(BENDING.widths) / 0.2)
+"""Most of the virgin curve bends within a tenth of the range."""
+
+
+def test_intervals_are_placed_where_equal_ones_miss_the_bend():
+    equal = IntervalBasis.over(8, 2.0)
+    choice = choose(equal, Rls(1.0), motion(BENDING, BENT))
+    assert choice.chosen.places == 7 and choice.chosen.parts == ()
+    assert choice.chosen.rms < 0.5 * choice.tried[0].rms
+    widths = choice.model.basis.widths
+    assert isinstance(choice.model.basis, IntervalBasis) and widths.sum() == pytest.approx(2.0)
+    assert np.count_nonzero(np.cumsum(widths) < 0.6) >= 4
+    assert "intervals placed" in choice.notes[0] and "identify has them 0.25 to 0.25 m" in choice.notes[1]
+
+
+def test_intervals_that_lie_where_the_curve_bends_stay_as_configured():
+    choice = choose(PLAIN, Rls(1.0), motion(PLAIN, FALL))
+    assert choice.chosen.places == 0 and np.array_equal(choice.model.basis.widths, PLAIN.widths)
+    assert "intervals lie as configured" in choice.notes[1]
+
+
+def test_a_shape_is_found_with_intervals_that_were_placed():
+    truth = ShapedIntervalBasis(BENDING.widths, ["reversible"], shape=BENT)
+    added = 40.0 * np.array([1.0, -0.5, 0.5, 1.0]) / 200  # of the size that 200 intervals have
+    choice = choose(IntervalBasis.over(8, 2.0), Rls(1.0), motion(truth, np.append(BENT, added * 8)))
+    assert "reversible" in choice.chosen.parts and choice.chosen.places == 7, choice.notes
+    assert choice.model.basis.widths.min() < 0.5 * choice.model.basis.widths.max()
+
+
+def test_places_know_nothing_of_the_block_held_out():
+    seen = motion(BENDING, BENT)
+    rows = np.arange(seen.force.size)
+    blocks = np.array_split(rows, 3)
+    equal = IntervalBasis.over(8, 2.0)
+
+    def lie(force):
+        return placed(equal, Rls(1.0), seen.position, force, seen.good, seen.gate, blocks)
+
+    told = lie(seen.force)
+    for k, block in enumerate(blocks):
+        other = lie(np.where(np.isin(rows, block), -7.0 * seen.force[::-1], seen.force))
+        assert np.array_equal(other.without[k], told.without[k])
+        assert not np.array_equal(other.widths, told.widths)
+
+
+def test_why_intervals_were_not_placed_is_said():
+    few = choose(PLAIN, Rls(1.0), motion(PLAIN, FALL, rows=250))
+    assert "intervals placed (300)" in few.notes[-1] and few.chosen.places == 0
+    many = IntervalBasis.over(MOST_INTERVALS + 1, 2.0)
+    still = np.zeros(10)
+    why = placed(many, Rls(1.0), still, still, still == 0.0, 0.0, [np.arange(5)])
+    assert isinstance(why, str) and str(MOST_INTERVALS) in why
+
+
 def test_auto_in_a_configuration_chooses_and_notes():
     from rtcomp.jobs.identify import identify
 
@@ -102,6 +172,23 @@ def test_auto_in_a_configuration_chooses_and_notes():
     assert "held-out error" in note
     assert "output" in note and isinstance(done.model.basis, ShapedIntervalBasis)
     assert done.model.to_dict()["model"] == "shaped-interval"
+
+
+def test_auto_places_intervals_and_keeps_what_is_known():
+    from rtcomp.jobs.identify import identify
+
+    config = Configuration.load(shipped("leuven.yaml"))
+    section = {**config.file.data["identify"], "spacing": 1.0}
+    reference = {**config.file.data["reference"], "duration": 3.0}
+    judged = {}
+    for model in ("interval", "auto"):
+        done = identify(config.changed(identify={**section, "model": model}, reference=reference))
+        judged[model] = done.held_out.relative
+    assert any(n.startswith("intervals placed") for n in done.notes), done.notes
+    assert judged["auto"] < 0.7 * judged["interval"]
+    assert done.model.to_dict()["model"] == "interval" and done.model.reached is not None
+    assert np.ptp(done.model.basis.widths) > 1e-6
+    assert (np.diff(done.model.weights) <= 1e-9 * done.model.weights[0]).all()  # the prior of the file
 
 
 @pytest.mark.parametrize(

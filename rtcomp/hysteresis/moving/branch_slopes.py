@@ -6,6 +6,8 @@ no interval, so it says where the intervals belong (`placing`) and does not chan
 
 from __future__ import annotations
 
+import numpy as np
+
 from rtcomp.hysteresis.moving import places as at
 from rtcomp.kernels import Floats, compiled
 
@@ -39,11 +41,27 @@ def filter_slopes(p: Floats, s: Floats, m: Floats, first: int, last: int, off: f
 
 
 @compiled
+def begin(p: Floats, s: Floats, m: Floats, force: float) -> None:
+    """Begin a way here, at `force` (N): what has been passed until now says nothing."""
+    passed = at.AMOUNTS + int(p[at.CELLS])
+    for c in range(int(s[at.FIRST]), int(s[at.LAST]) + 1):
+        s[passed + c] = 0.0
+    s[at.FIRST], s[at.LAST], s[at.PATH], s[at.BEGUN] = p[at.CELLS], -1.0, 0.0, 0.0
+    m[at.BASE] = force
+
+
+@compiled
 def slopes(p: Floats, s: Floats, m: Floats, force: float) -> None:
-    """Take the slope of the branch from the way just made, where it is long enough, into the cells passed."""
+    """Take the slope of the branch from the way just made, where it is long enough, into the cells passed.
+
+    Where `force` (N), or that of the sample before, is not a number, nothing is known of the way between.
+    """
     cells = int(p[at.CELLS])
     passed, variance = at.AMOUNTS + cells, at.ARRAYS + cells
     corner = at.EDGES + int(p[at.COUNT]) + 1
+    if not (abs(force) < np.inf and abs(m[at.FORCE]) < np.inf):
+        begin(p, s, m, force)
+        return
     if s[at.BEGUN] > 0.0:
         s[at.BEGUN] = 0.0
         m[at.BASE] = m[at.FORCE]
@@ -68,7 +86,4 @@ def slopes(p: Floats, s: Floats, m: Floats, force: float) -> None:
             m[at.STEPS] = min(m[at.STEPS] + 1.0, NOISE_MEMORY)
             m[at.STEP_NOISE] += (off * off - m[at.STEP_NOISE]) / m[at.STEPS]
             filter_slopes(p, s, m, first, last, off)
-    for c in range(first, last + 1):
-        s[passed + c] = 0.0
-    s[at.FIRST], s[at.LAST], s[at.PATH] = float(cells), -1.0, 0.0
-    m[at.BASE] = force
+    begin(p, s, m, force)

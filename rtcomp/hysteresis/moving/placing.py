@@ -179,11 +179,14 @@ def place(
     p, s, x: the operator's parameters (changed where an interval moves), the identifier's state and
     regressors; lead_s, lead_x: the compensator's. w (N/m) and `begun`, the weights that a diverged
     identifier goes back to. scales: half the widths (m). m: what is remembered. change: see `places`.
-    force (N) of the sample; error (N): what the weights were changed by; not a number where they were not.
+    force (N) of the sample, not a number where it does not count; error (N): what the weights were changed
+    by; not a number where they were not.
     """
     change[at.INTERVALS], change[at.CHANGED] = p[at.COUNT], 0.0
     slopes(p, s, m, force)
-    m[at.FORCE], m[at.PEAK] = force, max(m[at.PEAK], abs(force))
+    m[at.FORCE] = force
+    if abs(force) < np.inf:
+        m[at.PEAK] = max(m[at.PEAK], abs(force))
     if not abs(error) < np.inf:
         return
     count = int(p[at.COUNT])

@@ -259,3 +259,29 @@ def test_any_number_of_intervals_learns(count):
     )
     assert placed.size == count and np.isfinite(weights).all()
     assert all(a < b for a, b in pairwise(np.cumsum(placed.widths)))
+
+
+def test_what_does_not_count_is_moved_through_and_nothing_else():
+    fine, slopes = bending(0.05)
+    own = cycles(30)
+    force = regressors(fine, own) @ slopes
+    counted = np.ones(own.size, dtype=np.bool_)
+    counted[2000:3500] = counted[9000:9007] = False
+    start, learner = SelfPlacingBasis.over(12, 1.0), Rls(0.9995)
+    one, w = learn_places(start, learner, own, force, 0.002, counted)
+    other, v = learn_places(start, learner, own, np.where(counted, force, np.nan), 0.002, counted)
+    assert np.array_equal(one.widths, other.widths) and np.array_equal(w, v)
+    assert not np.allclose(one.widths, start.widths)
+    whole, u = learn_places(start, learner, own, force, 0.002)
+    judged, wanted = cycles(12, 1), regressors(fine, cycles(12, 1)) @ slopes
+    assert off(one, w, judged, wanted) < 1.5 * off(whole, u, judged, wanted)
+
+
+def test_a_constant_force_is_learned_beside_the_places():
+    fine, slopes = bending(0.05)
+    own = cycles(30)
+    force = regressors(fine, own) @ slopes + 2.0
+    start = SelfPlacingBasis.over(12, 1.0)
+    found, w = learn_places(start, Rls(0.9995), own, force, 0.002, offset=True)
+    assert w[-1] * start.scales().mean() == pytest.approx(2.0, abs=0.01)
+    assert not np.allclose(found.widths, start.widths)
