@@ -63,6 +63,35 @@ def integral(q: float, point: float, spacing: float) -> float:
     return spacing * total
 
 
+@compiled
+def beyond_grain(s: Floats, at: int, step: float, grain: float) -> float:
+    """Return how far (m, either way) a step (m) goes beyond the grain (m), within which motion is noise.
+
+    s[at]: the place within the grain (m); s[at + 1]: the direction of motion beyond it (1; 0 before there was
+    any). A turn that goes twice the grain was no noise: it counts from where it began.
+    """
+    inside = s[at] + step
+    s[at] = min(max(inside, -grain), grain)
+    way = inside - s[at]
+    if way == 0.0:
+        return 0.0
+    direction = 1.0 if way > 0.0 else -1.0
+    if s[at + 1] != direction:
+        way += direction * (grain - s[at + 1] * direction * grain)
+        s[at + 1] = direction
+    return float(abs(way))
+
+
+@compiled
+def as_skewed(inputs: Floats, skew: float, grain: float) -> Floats:
+    """Return the motion (m, (K,)) that a symmetric operator must see to be one of such a skew (1)."""
+    seen, state = inputs.copy(), np.zeros(2)
+    for k in range(1, inputs.size):
+        step = inputs[k] - inputs[k - 1]
+        seen[k] = seen[k - 1] + step + skew * beyond_grain(state, 0, step, grain)
+    return seen
+
+
 @basis_kernel
 def shaped_interval_operator(p: Floats, s: Floats, x: Floats, u: float) -> None:
     """p: N, widths (m), then the places above. s: the interval operator's, the last input (m), the
@@ -81,16 +110,7 @@ def shaped_interval_operator(p: Floats, s: Floats, x: Floats, u: float) -> None:
     s[last] = u
     if step == 0.0:
         return
-    grain = p[at + GRAIN]
-    inside = s[last + 1] + step
-    s[last + 1] = min(max(inside, -grain), grain)
-    travel = inside - s[last + 1]
-    if travel != 0.0:
-        direction = 1.0 if travel > 0.0 else -1.0
-        if s[last + 2] != direction:  # no noise turns so far: the way since the turn was motion
-            travel += direction * (grain - s[last + 2] * direction * grain)
-            s[last + 2] = direction
-        step += p[at + SKEW] * abs(travel)
+    step += p[at + SKEW] * beyond_grain(s, last + 1, step, p[at + GRAIN])
     s[INPUT] = 0.0  # the operator sees displacements, so that a skewed one accumulates nothing
     advance(p, s, x, step)
     z = 0.0

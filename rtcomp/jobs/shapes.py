@@ -6,7 +6,8 @@ whose error is not significantly above the best one's. A part that the motion sa
 tried. The symmetric operator is always among the candidates.
 
 Each shape is tried with the intervals of the configuration and with intervals placed by the motion itself
-(`placed`), found anew without each block held out. Boundaries that were found are counted as weights are.
+(`placed`), found anew without each block held out. Those are taken only where the others are significantly
+worse.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from rtcomp.hysteresis.basis import Basis, regressors
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.learner import Learner
 from rtcomp.hysteresis.model import HysteresisModel
-from rtcomp.hysteresis.shaped import ShapedIntervalBasis
+from rtcomp.hysteresis.shaped import ShapedIntervalBasis, as_skewed
 from rtcomp.jobs.configuration import AUTO, Configuration
 from rtcomp.jobs.judge import Friction
 from rtcomp.jobs.known import completed
@@ -72,11 +73,6 @@ class Candidate:
     squares: Floats
     places: int = 0
     """Boundaries between intervals that the motion placed; 0 where they lie as configured."""
-
-    @property
-    def size(self) -> int:
-        """How many numbers were learned: weights and places."""
-        return self.weights + self.places
 
     @property
     def holds(self) -> str:
@@ -143,23 +139,35 @@ def with_offset(basis: Basis, position: Floats) -> Floats:
     return np.column_stack([x, np.full(position.size, basis.scales().mean())])
 
 
-def smallest_that_pays(candidates: Sequence[Candidate]) -> int:
-    """Return the index of the smallest candidate whose error is not significantly the worse.
+def significantly_worse(one: Candidate, other: Candidate) -> bool:
+    """Tell whether the error of `one` is above that of `other` by more than chance, and by 2 % at least.
 
-    Of equal size, intervals as configured come first, then what has no skew.
     Paired over the blocks held out, by the logarithm of the error, for blocks differ in how much moves in
-    them: one-sided 95 % against the best, and never for less than 2 % of the error.
+    them: one-sided 95 %, or in every block (sign test).
     """
-    best = min(candidates, key=lambda c: c.rms)
-    ranks = [(c.size, c.places, bool(c.skew)) for c in candidates]
-    for i in sorted(range(len(candidates)), key=lambda i: ranks[i]):
-        worse = 0.5 * np.log(np.maximum(candidates[i].squares, 1e-300) / np.maximum(best.squares, 1e-300))
-        count = worse.size
-        doubt = _T.get(count, 1.8) * float(worse.std(ddof=1)) / np.sqrt(count) if count > 1 else 0.0
-        always = count >= _SIGNS and bool((worse > 0.0).all())
-        if worse.mean() <= (LEAST_GAIN if always else max(doubt, LEAST_GAIN)):
-            return i
-    return candidates.index(best)
+    worse = 0.5 * np.log(np.maximum(one.squares, 1e-300) / np.maximum(other.squares, 1e-300))
+    count = worse.size
+    doubt = _T.get(count, 1.8) * float(worse.std(ddof=1)) / np.sqrt(count) if count > 1 else 0.0
+    always = count >= _SIGNS and bool((worse > 0.0).all())
+    return bool(worse.mean() > (LEAST_GAIN if always else max(doubt, LEAST_GAIN)))
+
+
+def smallest_that_pays(candidates: Sequence[Candidate]) -> int:
+    """Return the index of the candidate with the fewest weights not significantly worse than the best.
+
+    With intervals as configured, that is; with those that were placed it is sought by itself, and taken only
+    where the other is significantly worse. All at once, many candidates more would make more of chance.
+    """
+    found = {}
+    for lie in (False, True):
+        own = [i for i, c in enumerate(candidates) if bool(c.places) == lie]
+        own.sort(key=lambda i: (candidates[i].weights, bool(candidates[i].skew)))
+        if own:
+            best = min((candidates[i] for i in own), key=lambda c: c.rms)
+            found[lie] = next(i for i in own if not significantly_worse(candidates[i], best))
+    if len(found) == 2 and not significantly_worse(candidates[found[False]], candidates[found[True]]):
+        return found[False]
+    return found[max(found)]
 
 
 def choose(plain: IntervalBasis, learner: Learner, motion: Motion, blocks: int = BLOCKS) -> Choice:
@@ -169,38 +177,37 @@ def choose(plain: IntervalBasis, learner: Learner, motion: Motion, blocks: int =
     """
     rows = _gated(motion)
     parts_of_time = np.array_split(rows, blocks)
-    as_configured = Placed(plain.widths, (plain.widths,) * blocks)
-    lies: list[tuple[int, Placed]] = [(0, as_configured)]
     left: list[str] = []
     tried: list[Candidate] = []
     skew = (
         _best_skew(plain, learner, motion, rows, parts_of_time) if rows.size >= _needed(plain.size) else 0.0
     )
+    amounts, ends = tuple(dict.fromkeys((0.0, skew))), plain.size - 1
+    lies = {(0, amount): Placed(plain.widths, (plain.widths,) * blocks) for amount in amounts}
     unmoved = ""
-    if rows.size >= _needed(2 * plain.size - 1) and plain.size > 1:
-        moved = placed(plain, learner, motion.position, motion.force, motion.good, motion.gate, parts_of_time)
+    for amount in amounts if ends and rows.size >= _needed(plain.size + ends) else ():
+        moved = _placed(plain, learner, motion, amount, parts_of_time)
         if isinstance(moved, Placed):
-            lies.append((plain.size - 1, moved))
+            lies[ends, amount] = moved
         else:
-            unmoved = moved
-    elif plain.size > 1:
-        left.append(f"{PLACED} ({_needed(2 * plain.size - 1)})")
+            unmoved = unmoved or moved
     for parts in LADDER:
-        for places, at in lies:
+        for places in dict.fromkeys((0, ends)):
             size = ShapedIntervalBasis(plain.widths, parts).size + places
             if (parts or places) and rows.size < _needed(size):
                 left.append(f"{' + '.join([*([PLACED] if places else []), *parts])} ({_needed(size)})")
                 break
-            for amount in dict.fromkeys((0.0, skew)):
-                judged = _judged(at.without, parts, amount, learner, motion, rows, parts_of_time)
-                tried.append(replace(judged, places=places))
+            for amount in amounts:
+                if (at := lies.get((places, amount))) is not None:
+                    judged = _judged(at.without, parts, amount, learner, motion, rows, parts_of_time)
+                    tried.append(replace(judged, places=places))
     chosen = tried[smallest_that_pays(tried)]
-    widths = dict(lies)[chosen.places].widths
+    widths = lies[chosen.places, chosen.skew].widths
     found, w, state = _fitted(widths, chosen.parts, chosen.skew, learner, motion, rows)
     notes = [_verdict(chosen, tried)]
-    if len(lies) > 1:
+    if len(lies) > len(amounts):
         notes.append(_of_places(chosen, tried, plain.widths, widths))
-    if unmoved:
+    elif unmoved:
         notes.append(f"intervals lie as configured: {unmoved}")
     if left:
         notes.append(
@@ -257,10 +264,19 @@ def _of_places(chosen: Candidate, tried: Sequence[Candidate], before: Floats, af
         )
     same = [c for c in tried if c.places and c.parts == chosen.parts and c.skew == chosen.skew]
     if not same:
-        return f"{PLACED} not tried with {chosen}, for want of data"
+        return f"intervals lie as configured: placed ones were not tried with {chosen}"
     return (
         f"intervals lie as configured: placed ones have {same[0].rms:.3g} N, {chosen.rms:.3g} N as they lie"
     )
+
+
+def _placed(
+    plain: IntervalBasis, learner: Learner, motion: Motion, skew: float,
+    blocks: Sequence[npt.NDArray[np.int64]],
+) -> Placed | str:  # fmt: skip
+    """Place the intervals on the motion as an operator of such a skew sees it, or say why they are not."""
+    seen = as_skewed(motion.position, skew, motion.grain) if skew else motion.position
+    return placed(plain, learner, seen, motion.force, motion.good, motion.gate, blocks)
 
 
 def _needed(weights: int) -> int:

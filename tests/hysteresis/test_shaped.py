@@ -13,7 +13,7 @@ from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.basis import regressors
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.preisach import PreisachBasis
-from rtcomp.hysteresis.shaped import PARTS, ShapedIntervalBasis, integral
+from rtcomp.hysteresis.shaped import PARTS, ShapedIntervalBasis, as_skewed, integral
 from rtcomp.kernels import call_basis, compiled
 
 inputs = st.lists(st.floats(-1.5, 1.5), min_size=1, max_size=40).map(lambda a: np.array([0.0, *a]))
@@ -87,6 +87,14 @@ def test_a_skew_is_displacement_that_counts_more_in_one_direction():
     warped = np.concatenate([[0.0], np.cumsum(step * (1.0 + 0.1 * np.sign(step)))])
     skewed = ShapedIntervalBasis.over(6, 2.0, skew=0.1, parts=[])
     assert np.allclose(regressors(skewed, u), regressors(IntervalBasis.over(6, 2.0), warped), atol=1e-12)
+
+
+@settings(max_examples=60, deadline=None)
+@given(widths, inputs, st.floats(-0.5, 0.5), st.floats(0.0, 0.01))
+def test_the_symmetric_operator_on_the_motion_as_a_skewed_one_sees_it_is_that_one(a, u, skew, grain):
+    basis = ShapedIntervalBasis(a, [], skew=skew, grain=grain)
+    plain = regressors(IntervalBasis(a), as_skewed(u, skew, grain))
+    assert np.allclose(regressors(basis, u), plain, rtol=0, atol=1e-12)
 
 
 def test_noise_within_the_grain_does_not_ratchet():

@@ -93,15 +93,23 @@ def test_a_block_that_errs_much_has_no_more_say_in_the_skew_than_others():
     assert usual.typical < other.typical and usual.rms > other.rms
 
 
-def test_places_count_as_what_is_learned():
+def test_intervals_lie_as_configured_unless_placed_ones_are_significantly_better():
     base = np.random.default_rng(0).uniform(0.5, 2.0, 6)
-    plain, lies = Candidate((), 0.0, 8, base), Candidate((), 0.0, 8, 0.98 * base, places=7)
-    assert smallest_that_pays([lies, plain]) == 1  # as configured, unless placed ones are clearly better
-    lies = replace(lies, squares=0.3 * base)
-    assert smallest_that_pays([plain, lies]) == 1
-    output = Candidate(("output",), 0.0, 10, 0.3 * base)
-    assert smallest_that_pays([plain, lies, output]) == 2
+    plain, output = Candidate((), 0.0, 8, base), Candidate(("output",), 0.0, 10, 0.3 * base)
+    lies = Candidate((), 0.0, 8, 0.98 * base, places=7)
+    assert smallest_that_pays([lies, plain]) == 1
+    assert smallest_that_pays([plain, replace(lies, squares=0.3 * base)]) == 1
+    assert smallest_that_pays([plain, replace(lies, squares=0.3 * base), output]) == 2
     assert "8 weights and 7 places" in lies.holds and "intervals placed" in str(lies)
+
+
+def test_placed_intervals_do_not_change_which_shape_pays_with_the_configured_ones():
+    """A placed model that is best by a hair, and steadily so, makes no other configured model the choice."""
+    base = np.random.default_rng(0).uniform(0.5, 2.0, 6)
+    at_times = Candidate((), 0.1, 8, base * np.array([0.3, 0.6, 1.0, 1.0, 1.05, 1.05]))
+    plain, steady = Candidate((), 0.0, 8, base), Candidate(("position",), 0.0, 20, 0.8 * base, places=7)
+    assert smallest_that_pays([plain, at_times]) == 0
+    assert smallest_that_pays([plain, at_times, steady]) != 1
 
 
 BENDING = IntervalBasis.over(200, 2.0)
@@ -132,6 +140,14 @@ def test_a_shape_is_found_with_intervals_that_were_placed():
     choice = choose(IntervalBasis.over(8, 2.0), Rls(1.0), motion(truth, np.append(BENT, added * 8)))
     assert "reversible" in choice.chosen.parts and choice.chosen.places == 7, choice.notes
     assert choice.model.basis.widths.min() < 0.5 * choice.model.basis.widths.max()
+
+
+def test_places_are_found_on_the_motion_as_a_skew_counts_it():
+    truth = ShapedIntervalBasis(BENDING.widths, [], skew=0.12)
+    choice = choose(IntervalBasis.over(8, 2.0), Rls(1.0), motion(truth, BENT, size=3.0))
+    assert choice.chosen.skew == pytest.approx(0.12, abs=0.02) and choice.chosen.places == 7, choice.notes
+    least = min(c.rms for c in choice.tried if not c.places)
+    assert choice.chosen.rms < 0.5 * least
 
 
 def test_places_know_nothing_of_the_block_held_out():
