@@ -12,7 +12,7 @@ worse.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -102,7 +102,7 @@ class Choice:
 
     model: HysteresisModel
     chosen: Candidate
-    information: Floats
+    information: Callable[[], Floats]
     """What the data say of each combination of its weights and offset, (size + 1, size + 1)."""
     tried: list[Candidate] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -216,7 +216,7 @@ def choose(plain: IntervalBasis, learner: Learner, motion: Motion, blocks: int =
         )
     scales = np.append(found.scales(), found.scales().mean())
     model = HysteresisModel(found, w[:-1], float(w[-1] * scales[-1]))
-    return Choice(model, chosen, learner.information(state, scales), tried, notes)
+    return Choice(model, chosen, lambda: learner.information(state, scales), tried, notes)
 
 
 def that_pays(
@@ -241,10 +241,10 @@ def that_pays(
     if isinstance(basis, IntervalBasis) and not choice.chosen.places:
         return model, choice.notes
     weights = np.append(choice.model.weights, choice.model.offset / scale)
-    complete = completed(
-        section, basis, weights, float(scale), motion.position, config.period, lambda: choice.information
+    model = completed(
+        section, basis, weights, float(scale), motion.position, config.period, choice.information
     )
-    return complete, choice.notes
+    return model, choice.notes
 
 
 def _verdict(chosen: Candidate, tried: Sequence[Candidate]) -> str:
@@ -265,9 +265,8 @@ def _of_places(chosen: Candidate, tried: Sequence[Candidate], before: Floats, af
     same = [c for c in tried if c.places and c.parts == chosen.parts and c.skew == chosen.skew]
     if not same:
         return f"intervals lie as configured: placed ones were not tried with {chosen}"
-    return (
-        f"intervals lie as configured: placed ones have {same[0].rms:.3g} N, {chosen.rms:.3g} N as they lie"
-    )
+    error = f"{same[0].rms:.3g} N, {chosen.rms:.3g} N as they lie"
+    return f"intervals lie as configured: to place them does not pay, held-out error {error}"
 
 
 def _placed(
