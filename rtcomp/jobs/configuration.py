@@ -18,7 +18,7 @@ from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.moving.self_placing import SelfPlacingBasis
 from rtcomp.hysteresis.shaped import ShapedIntervalBasis
 from rtcomp.jobs.arming import Arming
-from rtcomp.jobs.limit_settings import Limits, Loop, Positive
+from rtcomp.jobs.limit_settings import Limits, Loop, Positive, beyond_stage
 from rtcomp.stage.schema import StageFile
 from rtcomp.stage.stage import Stage
 from rtcomp.yamlfile import Section, YamlFile, load_yaml, validate
@@ -194,12 +194,8 @@ class Configuration:
             validate(find(driver).Settings, file, ("device",))
         stage_keys = set(StageFile.model_fields)
         stage = Stage(StageFile.model_validate(run.model_dump(include=stage_keys, exclude_unset=True)))
-        limit = run.limits.voltage
-        if limit is not None and limit > stage.voltage_limit:
-            raise file.error(
-                ("limits", "voltage"),
-                f"is {limit:g} V; the stage's voltage_limit allows at most {stage.voltage_limit:g} V",
-            )
+        for key, says in beyond_stage(run.limits, stage):
+            raise file.error(key, says)
         return cls(run, stage, file)
 
     @property

@@ -51,8 +51,11 @@ def plant_on(link: str, stage: Path, watchdog: float, *, seed: int = 0) -> Plant
 def patient(config: Configuration, device: dict[str, Any], age: float, **limits: Any) -> Configuration:
     """Return `config` on `device`, with `limits.age` (s) and other limits, that lost slots do not end."""
     data = config.file.data
+    given = {**(data.get("limits") or {}), "age": age, **limits}
+    if "invalid" in given:  # an age shorter than it would leave it without effect, which is refused
+        given["invalid"] = min(given["invalid"], given["age"])
     return config.changed(
         device=device,
-        limits={**(data.get("limits") or {}), "age": age, **limits},
+        limits=given,
         loop={**(data.get("loop") or {}), "slots_lost": NO_MATTER},
     )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
-from rtcomp.errors import ConfigError
+from rtcomp.stage.stage import Stage
 from rtcomp.yamlfile import Section
 
 Positive = Annotated[float, Field(gt=0)]
@@ -14,6 +15,8 @@ Window = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 STUCK_S = 0.25
 """s that a real axis may stand still while fully driven, unless the file says otherwise."""
+NOISE_COUNTS = 6.0
+"""Times the sensor's rms noise that a resting position may flicker."""
 
 
 class Limits(Section):
@@ -43,13 +46,6 @@ class Limits(Section):
             raise ValueError(f"is [{value[0]:g}, {value[1]:g}]; the lowest must come first")
         return value
 
-    @model_validator(mode="after")
-    def _reachable(self) -> Limits:
-        if self.voltage is not None and self.moves_at is not None and self.moves_at > self.voltage:
-            says = f"{self.moves_at:g} V is more than limits.voltage ({self.voltage:g} V) ever lets out"
-            raise ConfigError(says, key=("moves_at",))
-        return self
-
 
 class Loop(Section):
     """The section ``loop``: what missed deadlines do."""
@@ -62,3 +58,53 @@ class Loop(Section):
         None, ge=1, le=1_000_000_000,
         description="slots lost after which the loop stops; without it 20 on hardware, none elsewhere",
     )  # fmt: skip
+
+
+Wrong = tuple[tuple[str, ...], str]
+"""Key of the configuration and what is wrong with it."""
+
+
+def flicker(stage: Stage) -> float:
+    """Return how far (m) the measured position of a resting axis moves: a count and the sensor's noise."""
+    return stage.sensor.resolution + NOISE_COUNTS * stage.sensor.noise
+
+
+def beyond_stage(limits: Limits, stage: Stage) -> Iterator[Wrong]:
+    """Yield the voltages that are never reached, whatever is done with the configuration."""
+    most, whose = stage.voltage_limit, "the stage's voltage_limit"
+    if limits.voltage is not None and limits.voltage > most:
+        yield ("limits", "voltage"), f"is {limits.voltage:g} V; {whose} allows at most {most:g} V"
+    if limits.voltage is not None:
+        most, whose = limits.voltage, "limits.voltage"
+    if limits.moves_at is not None and limits.moves_at > most:
+        says = f"{limits.moves_at:g} V is more than {whose} ({most:g} V) ever lets out; lower it"
+        yield ("limits", "moves_at"), says
+
+
+def contradictions(limits: Limits, stage: Stage, device: Mapping[str, Any]) -> Iterator[Wrong]:
+    """Yield the limits that a closed loop could not keep, or that another one leaves without effect."""
+    tick = 1.0 / stage.rate
+    for key in ("age", "stuck"):
+        given = getattr(limits, key) if key in limits.model_fields_set else None
+        if given is not None and given < tick:
+            says = f"{given:g} s is less than a tick ({tick:g} s at {stage.rate:g} Hz); give some ticks"
+            yield ("limits", key), says
+    if limits.invalid > limits.age:
+        yield ("limits", "invalid"), (
+            f"{limits.invalid:g} s is more than limits.age ({limits.age:g} s), after which the loop stops "
+            "whatever the reason; lower it, or raise that"
+        )
+    least = flicker(stage)
+    if limits.jump is not None and limits.jump < least:
+        yield ("limits", "jump"), (
+            f"{limits.jump:g} m is less than a resting position flickers by ({least:g} m, sensor.resolution "
+            "and six times sensor.noise); give more than that"
+        )
+    most = limits.voltage or stage.voltage_limit
+    its_own = device.get("voltage_limit")
+    if isinstance(its_own, int | float) and its_own < most * (1.0 - 1e-9):
+        whose = "limits.voltage" if limits.voltage is not None else "the stage's voltage_limit"
+        yield ("device", "voltage_limit"), (
+            f"{its_own:g} V is less than {whose} ({most:g} V): what the device cuts off would be taken for "
+            f"force; set limits.voltage to {its_own:g} V or less"
+        )

@@ -26,8 +26,8 @@ from rtcomp.hysteresis.shaped import ShapedIntervalBasis, as_skewed
 from rtcomp.jobs.configuration import AUTO, Configuration
 from rtcomp.jobs.judge import Friction
 from rtcomp.jobs.known import completed
+from rtcomp.jobs.limit_settings import flicker
 from rtcomp.jobs.placed import Placed, placed
-from rtcomp.jobs.tick_settings import NOISE_COUNTS
 from rtcomp.kernels import Floats, call_learner, compiled
 
 LADDER: tuple[tuple[str, ...], ...] = (
@@ -233,8 +233,7 @@ def that_pays(
         return model, []
     rows = friction.time <= window[1]
     good = friction.good & (friction.time >= window[0])
-    sensor = config.stage.sensor
-    grain = 0.5 * (sensor.resolution + NOISE_COUNTS * sensor.noise)  # to either side
+    grain = 0.5 * flicker(config.stage)  # to either side
     motion = Motion(friction.position[rows], friction.force[rows], good[rows], section.gate, grain)
     choice = choose(plain, config.learner(), motion)
     basis, scale = choice.model.basis, choice.model.basis.scales().mean()

@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 
 from rtcomp.jobs.configuration import Configuration
-from rtcomp.jobs.limit_settings import STUCK_S
+from rtcomp.jobs.limit_settings import STUCK_S, contradictions, flicker
 from rtcomp.loop.tick import TickSettings
 
 SIGN_S, SIGN_TICKS = 5e-3, 8
 """s and ticks, at least, of each of the two windows in which a driven axis must not run against its drive."""
 FULL_DRIVE = 0.98
 """Of the voltage limit: what counts as driven with all there is."""
-NOISE_COUNTS = 6.0
-"""Times the sensor's rms noise that a resting position may flicker."""
 SLOTS_LOST = 20
 """Slots lost after which a loop stops, unless told."""
 MOST_FORCE = 10.0
@@ -24,7 +22,7 @@ def tick_settings(config: Configuration, delay_ticks: int, closed_loop: bool) ->
     """Return the settings of a tick. In open loop nothing is checked: the positions are what they were.
 
     Whether the axis follows its drive is checked on real devices, and in simulation where the section
-    ``limits`` says so.
+    ``limits`` says so. Raises ConfigError for limits that a closed loop could not keep.
     """
     stage, section = config.stage, config.run.identify
     axis = TickSettings(
@@ -39,8 +37,9 @@ def tick_settings(config: Configuration, delay_ticks: int, closed_loop: bool) ->
     if not closed_loop:
         return axis
     limits, loop = config.run.limits, config.run.loop
+    for key, says in contradictions(limits, stage, config.run.device):
+        raise config.file.error(key, says)
     travel = limits.travel or [-math.inf, math.inf]
-    sensor = stage.sensor
     stuck = limits.stuck or (STUCK_S if config.real_device else math.inf)
     asked = config.real_device or limits.stuck is not None or limits.moves_at is not None
     drive = (limits.moves_at or FULL_DRIVE * config.voltage_limit) if asked else math.inf
@@ -48,7 +47,7 @@ def tick_settings(config: Configuration, delay_ticks: int, closed_loop: bool) ->
         travel=(travel[0], travel[1]),
         speed=10.0 * (limits.speed or math.inf),
         jump=limits.jump or math.inf,
-        one_count=sensor.resolution + NOISE_COUNTS * sensor.noise,
+        one_count=flicker(stage),
         stuck_volts=drive,
         stuck_ticks=math.ceil(stuck / config.period) if math.isfinite(stuck) else math.inf,
         sign_volts=drive,

@@ -41,6 +41,40 @@ def test_times_become_ticks_of_the_rate(leuven):
     assert paced.device_paced and paced.slots_lost == 3
 
 
-def test_limits_that_contradict_each_other_are_refused(leuven):
-    with pytest.raises(ConfigError, match=r"limits.moves_at: 3 V is more than limits.voltage \(2 V\)"):
-        leuven.changed(limits={"voltage": 2.0, "moves_at": 3.0})
+SERIAL = {"driver": "serial", "port": "/dev/null"}
+
+
+@pytest.mark.parametrize(
+    ("sections", "says"),
+    [
+        ({"limits": {"voltage": 2.0, "moves_at": 3.0}}, r"moves_at: 3 V is more than limits.voltage \(2 V\)"),
+        ({"limits": {"moves_at": 20.0}}, r"moves_at: 20 V is more than the stage's voltage_limit \(10 V\)"),
+        ({"limits": {"voltage": 11.0}}, r"limits.voltage: is 11 V; .* at most 10 V"),
+        ({"limits": {"age": 5e-4}}, r"limits.age: 0.0005 s is less than a tick \(0.001 s at 1000 Hz\)"),
+        ({"limits": {"stuck": 1e-9}}, r"limits.stuck: 1e-09 s is less than a tick"),
+        ({"limits": {"invalid": 5.0}}, r"limits.invalid: 5 s is more than limits.age \(0.1 s\)"),
+        ({"limits": {"jump": 1e-8}}, r"limits.jump: 1e-08 m is less than a resting .* \(1e-07 m"),
+        ({"device": {**SERIAL, "voltage_limit": 2.0}}, r"device.voltage_limit: 2 V is less than the stage's"),
+        (
+            {"device": {**SERIAL, "voltage_limit": 2.0}, "limits": {"voltage": 3.0}},
+            r"device.voltage_limit: 2 V is less than limits.voltage \(3 V\)",
+        ),
+    ],
+)
+def test_limits_that_contradict_each_other_are_refused(leuven, sections, says):
+    with pytest.raises(ConfigError, match=says):
+        tick_settings(leuven.changed(**sections), 0, True)
+
+
+def test_limits_that_just_go_together_are_taken(leuven):
+    limits = {"voltage": 10.0, "moves_at": 10.0, "age": 1e-3, "stuck": 1e-3, "invalid": 1e-3, "jump": 1e-7}
+    assert tick_settings(leuven.changed(limits=limits), 0, True).invalid_ticks == 1
+    board = {**SERIAL, "voltage_limit": 2.0}
+    assert tick_settings(leuven.changed(device=board, limits={"voltage": 2.0}), 1, True).age_ticks == 100
+
+
+def test_a_recording_is_learned_from_whatever_its_rate_makes_of_the_limits(leuven):
+    slow = leuven.changed(rate=5.0, limits={"age": 0.1, "stuck": 0.1})
+    assert tick_settings(slow, 0, False).age_ticks == math.inf
+    # An age that nobody gave is no contradiction.
+    assert tick_settings(leuven.changed(rate=5.0, limits={}), 0, True).age_ticks == 1
