@@ -90,21 +90,24 @@ def contradictions(limits: Limits, stage: Stage, device: Mapping[str, Any]) -> I
             says = f"{given:g} s is less than a tick ({tick:g} s at {stage.rate:g} Hz); give some ticks"
             yield ("limits", key), says
     if limits.invalid > limits.age:
-        yield ("limits", "invalid"), (
+        says = (
             f"{limits.invalid:g} s is more than limits.age ({limits.age:g} s), after which the loop stops "
             "whatever the reason; lower it, or raise that"
         )
+        yield ("limits", "invalid"), says
     least = flicker(stage)
     if limits.jump is not None and limits.jump < least:
-        yield ("limits", "jump"), (
+        says = (
             f"{limits.jump:g} m is less than a resting position flickers by ({least:g} m, sensor.resolution "
             "and six times sensor.noise); give more than that"
         )
+        yield ("limits", "jump"), says
     most = limits.voltage or stage.voltage_limit
     its_own = device.get("voltage_limit")
     if isinstance(its_own, int | float) and its_own < most * (1.0 - 1e-9):
         whose = "limits.voltage" if limits.voltage is not None else "the stage's voltage_limit"
-        yield ("device", "voltage_limit"), (
+        says = (
             f"{its_own:g} V is less than {whose} ({most:g} V): what the device cuts off would be taken for "
             f"force; set limits.voltage to {its_own:g} V or less"
         )
+        yield ("device", "voltage_limit"), says
