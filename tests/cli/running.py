@@ -65,11 +65,13 @@ class Running:
 class Plant(Running):
     """`rtcomp plant serve` of the configuration of these tests."""
 
-    def __init__(self, folder: Path, config: Path | None = None) -> None:
+    def __init__(self, folder: Path, config: Path | None = None, *more: object) -> None:
         if config is None:
             config = folder / "plant.yaml"
             config.write_text(CONFIG)
-        super().__init__("plant", "serve", "--config", config, "--json", "--log", "plant.json", at=folder)
+        super().__init__(
+            "plant", "serve", "--config", config, "--json", "--log", "plant.json", *more, at=folder
+        )
         assert self.process.stdout is not None
         self.port: str = json.loads(self.process.stdout.readline())["port"]
 

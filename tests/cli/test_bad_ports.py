@@ -159,3 +159,53 @@ def test_a_plant_that_dies_while_running(folder: Path, command: str, force: bool
     assert {p.name for p in folder.iterdir()} == {
         "results", f"{out}.failed", "model.yaml", "run.yaml", "plant.yaml",
     }  # fmt: skip
+
+
+CAN = {
+    "odrive-can": "lead: 1.0e-3, check_watchdog: false, heartbeat_timeout: 10.0",
+    "cia402": "node: 5",
+}
+
+
+@pytest.mark.parametrize("drive", CAN)
+def test_an_adapter_that_is_unplugged_while_running(folder: Path, drive: str) -> None:
+    patience = "connect_timeout: 10.0, watchdog: 10.0, max_missed: 20000"
+    before = listing(folder / "results")
+    own = ["--watchdog", "10"] if drive == "odrive-can" else []  # of a CiA 402 drive the host sets it
+    with Plant(folder, None, "--link", drive, *own) as plant:
+        device = f"{{driver: {drive}, interface: slcan, channel: {plant.port}, {CAN[drive]}, {patience}}}"
+        (folder / "run.yaml").write_text(configuration(device))
+        with Running(*arguments("identify"), at=folder) as run:
+            run.wait_for_rows(f"results.new-{run.process.pid}/recording.h5", 300)
+            plant.process.send_signal(signal.SIGKILL)
+            ended = run.end()
+    one_error_line(ended, [plant.port, "has gone", "kept in results.failed"])
+    assert listing(folder / "results") == before
+    with h5py.File(folder / "results.failed" / "recording.h5", "r") as file:
+        assert len(file["time"]) == len(file["position"]) >= 300
+
+
+@pytest.mark.parametrize("drive", CAN)
+def test_an_adapter_that_another_program_has(folder: Path, drive: str) -> None:
+    with terminal() as port:
+        device = f"{{driver: {drive}, interface: slcan, channel: {port}, {CAN[drive]}}}"
+        (folder / "run.yaml").write_text(configuration(device))
+        holder = subprocess.Popen(
+            [sys.executable, "-c", HOLDER, port], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
+        assert holder.stdout is not None and holder.stdout.readline() == b"held\n"
+        try:
+            refused(*arguments("identify"), at=folder, says=[port, "busy"])
+        finally:
+            holder.communicate()
+
+
+@pytest.mark.parametrize("drive", CAN)
+def test_a_port_that_is_no_can_adapter(folder: Path, drive: str) -> None:
+    """A serial device of another kind, that says nothing or something else."""
+    for answer in (lambda _: b"", lambda _: b"login: \r\n", lambda heard: heard):
+        with terminal(answer) as port:
+            quick = "connect_timeout: 0.5"
+            device = f"{{driver: {drive}, interface: slcan, channel: {port}, {CAN[drive]}, {quick}}}"
+            (folder / "run.yaml").write_text(configuration(device))
+            refused(*arguments("identify"), at=folder, says=[port])
