@@ -108,12 +108,17 @@ def respond(p: Floats, s: Floats, weights: Floats, start: float, inputs: Floats,
         out[k] = force
 
 
+LEAST_WIDTH, LEAST_SHARE = 1e-15, 1e-12
+"""m, and share of the range: narrower intervals get lost in the rounding of a position."""
+
+
 @register_basis
 class IntervalBasis(Basis):
     """Intervals of the given widths (m), first to last; their sum is the input range of the hysteresis.
 
     The range is the distance between full saturation in one direction and in the other, that is twice
-    the travel of the virgin curve. Raises ConfigError for no, negative, zero or non-finite widths.
+    the travel of the virgin curve. Raises ConfigError for no, negative, zero or non-finite widths, and for
+    such as have collapsed.
     """
 
     name = "interval"
@@ -131,6 +136,14 @@ class IntervalBasis(Basis):
                 raise ConfigError(
                     f"interval model: widths[{i}] is {width:g} m; a width must be above 0", key=("widths", i)
                 )
+        least = max(LEAST_WIDTH, LEAST_SHARE * float(self.widths.sum()))
+        if self.widths.min() < least:
+            i = int(self.widths.argmin())
+            raise ConfigError(
+                f"interval model: widths[{i}] is {self.widths[i]:g} m of {self.widths.sum():g} m in all; less "
+                f"than {least:g} m is no width that motion could fill: leave it out",
+                key=("widths", i),
+            )
 
     @classmethod
     def over(cls, count: int, total: float, spacing: float = 1.0) -> IntervalBasis:

@@ -79,8 +79,11 @@ class HysteresisModel:
         rest = dict(entry)
         version = rest.pop("version", VERSION)
         if version != VERSION:
+            mend = "give that number"
+            if isinstance(version, int | float):
+                mend = "identify it anew" if version < VERSION else "update this program"
             raise ConfigError(
-                f"hysteresis model: version is {version!r}; this program reads version {VERSION}",
+                f"hysteresis model: version is {version!r}; this program reads version {VERSION}: {mend}",
                 key=("version",),
             )
         name, weights = rest.pop("model", None), rest.pop("weights", None)

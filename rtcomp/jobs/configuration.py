@@ -289,17 +289,18 @@ class Configuration:
     def basis(self) -> Basis:
         """Return the hysteresis basis that ``identify`` asks for."""
         section = self.identify
-        if section.widths is not None:
-            return self.moving(IntervalBasis(section.widths))
-        assert section.range is not None
         try:
+            if section.widths is not None:
+                return self.moving(IntervalBasis(section.widths))
+            assert section.range is not None
             if section.shape is not None:
                 shape = section.shape.model_dump()
                 return ShapedIntervalBasis.over(section.intervals, section.range, section.spacing, **shape)
             name = IntervalBasis.name if section.model == AUTO else section.model
             return basis_named(name).over(section.intervals, section.range, section.spacing)
         except ConfigError as error:
-            raise self.file.error(("identify", *error.key), str(error)) from error
+            laid = section.widths is None and error.key[:1] == ("widths",)  # by range, intervals and spacing
+            raise self.file.error(("identify", *(("range",) if laid else error.key)), str(error)) from error
 
     def moving(self, basis: Basis) -> Basis:
         """Return a model's basis, its intervals free to move on where ``identify`` asks for that."""

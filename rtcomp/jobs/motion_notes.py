@@ -34,9 +34,13 @@ def never_reached(model: HysteresisModel) -> list[str]:
     which = f"elements {missing[0]} to {missing[-1]} of {size} were never reached; their weights"
     if missing[-1] - missing[0] >= missing.size:
         which = f"{missing.size} of {size} elements, {missing[0]} first, were never reached; their weights"
+    zero, on = "are 0", "go on as those before them fall, where they are intervals"
+    if missing.size == 1:
+        which, zero = f"element {missing[0]} of {size} was never reached; its weight", "is 0"
+        on = "goes on as those before it fall, where it is an interval"
     if model.weights[missing - 1].any():
-        return [f"{which} go on as those before them fall, where they are intervals"]
-    return [f"{which} are 0: move further, or make identify.range smaller"]
+        return [f"{which} {on}"]
+    return [f"{which} {zero}: move further, or make identify.range smaller"]
 
 
 def one_way(basis: Basis, position: Floats) -> list[str]:

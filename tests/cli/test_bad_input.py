@@ -78,6 +78,8 @@ WRONG_KEYS = [
     ("range: 6.0e-5", "range: -6.0e-5", ["identify.range is -6e-05", "more than 0", "m, "], LOOPS),
     ("range: 6.0e-5", "widths: [1e-6, 0]", ["identify.widths[1] is 0", "more than 0", "m, "], LOOPS),
     ("range: 6.0e-5", "widths: [1e-6, -1e-6]", ["identify.widths[1] is -1e-06", "more than 0"], LOOPS),
+    ("range: 6.0e-5", "widths: [1e-6, 1e-99]", ["identify.widths", "widths[1] is 1e-99 m"], LEARNING),
+    ("range: 6.0e-5", "range: 1.0e-18", ["identify.range", "1e-15 m"], LEARNING),
     ("range: 6.0e-5", "widths: []", ["identify.widths has 0 entries", "at least 1"], LOOPS),
     ("intervals: 6", "model: intervall", ["identify.model", "did you mean 'interval'?"], LOOPS),
     ("intervals: 6", "model: stop\n  prior: non-increasing", ["identify.prior", "'stop'"], LOOPS),
@@ -225,6 +227,16 @@ MODELS = [
     ("widths: [1e-6]\nweights: [1]", ":1: ", ["model is missing"]),
     ("model: stop\nreaches: [1e-6, -2e-6]\nweights: [1, 1]", ":2: ", ["reaches[1] is -2e-06 m"]),
     ("model: interval\nwidths: [1e-6]\nweights: [1]\nversion: 9", ":4: ", ["version is 9", "version 1"]),
+    (
+        "model: interval\nwidths: [1e-6]\nweights: [1]\nversion: 0",
+        ":4: ",
+        ["version is 0", "identify it anew"],
+    ),
+    (
+        "model: interval\nwidths: [1e-6, 1e-99]\nweights: [1, 1]",
+        ":2: ",
+        ["widths[1] is 1e-99 m", "leave it out"],
+    ),
 ]
 
 

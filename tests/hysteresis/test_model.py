@@ -43,7 +43,8 @@ def test_numbers_survive_the_file_exactly(tmp_path_factory, elements):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"version": 2}, "version is 2"),
+        ({"version": 0}, "version is 0; this program reads version 1: identify it anew"),
+        ({"version": 2}, "version is 2; .* update this program"),
         ({"version": "one"}, "version is 'one'"),
         ({"weights": [3e5]}, "2 elements but 1 weights"),
         ({"weights": [3e5, float("nan")]}, "finite"),
@@ -56,6 +57,8 @@ def test_numbers_survive_the_file_exactly(tmp_path_factory, elements):
         ({"model": "intervall"}, "did you mean 'interval'"),
         ({"model": 3}, "model"),
         ({"widths": [1e-6, -2e-6]}, r"widths\[1\]"),
+        ({"widths": [1e-6, 1e-320]}, r"widths\[1\] is 9.99989e-321 m of 1e-06 m in all; less than 1e-15 m"),
+        ({"widths": [1.0, 1e-13]}, r"widths\[1\] is 1e-13 m of 1 m in all; less than 1e-12 m"),
         ({"widths": ["a", 2e-6]}, "widths"),
         ({"widht": [1e-6]}, "widht.*did you mean 'widths'"),
         ({"reached": [1.0]}, "reached"),

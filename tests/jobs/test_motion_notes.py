@@ -35,6 +35,7 @@ def test_an_ordinary_motion_needs_no_remark():
         (np.round(LOOP / 1e-5) * 1e-5, "20 elements, but only 13 distinct positions"),
         (1e-2 * np.sin(2 * np.pi * TIME), "200 times identify.range"),
         (0.3 * LOOP, "elements 9 to 20 of 20 were never reached"),
+        (0.78 * LOOP, "element 20 of 20 was never reached; its weight"),
     ],
 )
 def test_what_the_motion_lacks_is_said_once(position, says):
