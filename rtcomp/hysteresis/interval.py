@@ -140,8 +140,8 @@ class IntervalBasis(Basis):
         if self.widths.min() < least:
             i = int(self.widths.argmin())
             raise ConfigError(
-                f"interval model: widths[{i}] is {self.widths[i]:g} m of {self.widths.sum():g} m in all; less "
-                f"than {least:g} m is no width that motion could fill: leave it out",
+                f"interval model: widths[{i}] is {self.widths[i]:g} m of {self.widths.sum():g} m in all; "
+                f"less than {least:g} m is no width that motion could fill: leave it out",
                 key=("widths", i),
             )
 

@@ -21,7 +21,7 @@ from rtcomp_drivers.plant_links import DeviceSide
 from rtcomp_drivers.slcan import Frame
 from rtcomp_drivers.slcan_side import CanAxis, SlcanSide
 from running import Running, configuration
-from stand_in import StandIn, Weight
+from served_device import Served, Weight
 
 DEVICES = {
     "serial": "{driver: serial, port: PORT, connect_timeout: 5.0, watchdog: 10.0, max_missed: 20000}",
@@ -148,7 +148,7 @@ UNFIT: dict[str, tuple[str, Callable[[Weight], DeviceSide], list[str]]] = {
 def test_a_device_that_does_not_fit_is_one_line(folder: Path, what: str) -> None:
     link, made, says = UNFIT[what]
     weight = Weight()
-    with StandIn(made(weight)) as device:
+    with Served(made(weight)) as device:
         use(folder, link, device.port)
         refused(*GIVEN, at=folder, says=says)
     assert weight.pushed == 0.0
@@ -158,7 +158,7 @@ def test_a_device_that_does_not_fit_is_one_line(folder: Path, what: str) -> None
 
 def test_an_odrive_without_watchdog_is_refused_after_its_proof_at_zero_torque(folder: Path) -> None:
     weight = Weight()
-    with StandIn(SlcanSide(odrive(weight, watchdog=None))) as device:
+    with Served(SlcanSide(odrive(weight, watchdog=None))) as device:
         use(folder, "odrive-can", device.port)
         refused(*GIVEN, at=folder, says=["stays on", "enable_watchdog"])
     assert weight.pushed == 0.0
@@ -176,7 +176,7 @@ def test_a_drive_whose_units_are_not_those_of_the_file(
     folder: Path, old: str, new: str, says: list[str]
 ) -> None:
     weight = Weight()
-    with StandIn(SlcanSide(drive(weight))) as device:
+    with Served(SlcanSide(drive(weight))) as device:
         use(folder, "cia402", device.port, (old, new))
         refused(*GIVEN, at=folder, says=says)
     assert weight.pushed == 0.0
@@ -235,7 +235,7 @@ def test_a_port_that_is_another_device_s_when_it_is_opened_again(folder: Path) -
     """Looked at first, then opened to be driven: between the two it may have changed."""
     weight = Weight()
     side = Exchanged(board(weight), board(weight, axis="rotary"), hellos=2, commands=np.inf)
-    with StandIn(side) as device:
+    with Served(side) as device:
         use(folder, "serial", device.port)
         before = listing(folder / "results")
         one_error_line(_run(folder), [device.port, "axis is rotary"])
@@ -246,7 +246,7 @@ def test_a_port_that_is_another_device_s_when_it_is_opened_again(folder: Path) -
 def test_a_board_that_begins_anew_while_it_runs(folder: Path) -> None:
     first, second = Weight(), Weight()
     side = Exchanged(board(first), board(second), hellos=1000, commands=150)
-    with StandIn(side) as device:
+    with Served(side) as device:
         use(folder, "serial", device.port)
         before = listing(folder / "results")
         says = [device.port, "not armed any more but DISARMED", "kept in results.failed"]

@@ -30,7 +30,7 @@ class Weight:
         return self.position
 
 
-class StandIn:
+class Served:
     """Serves `side` at `port` in real time until the context ends."""
 
     def __init__(self, side: DeviceSide) -> None:
