@@ -138,8 +138,8 @@ def _bend(
     """Put into `held` (N/(N/m)) of each stop element what a little more of it does to the bent whole.
 
     The bent force is in proportion to all weights together, so their products with these sum up to it, and a
-    fit of them converges even where its branches are far from those of the weights at hand. The effect `first`
-    bends the whole, `total` (N) at `level` (N); those after it the whole with more of one element each.
+    fit of them converges even where its branches are far from those of the weights at hand. The effect
+    `first` bends the whole, `total` (N) at `level` (N); those after it the whole with more of one element.
     """
     count = weights.size
     w[GRIP], w[GRIP_LEVEL], w[FRICTION] = total, level, total

@@ -23,10 +23,6 @@ from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.learner import Learner
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.hysteresis.shaped import ShapedIntervalBasis, as_skewed
-from rtcomp.jobs.configuration import AUTO, Configuration
-from rtcomp.jobs.judge import Friction
-from rtcomp.jobs.known import completed
-from rtcomp.jobs.limit_settings import flicker
 from rtcomp.jobs.placed import Placed, placed
 from rtcomp.kernels import Floats, call_learner, compiled
 
@@ -119,13 +115,13 @@ def _learn_rows(
 
 def learned(basis: Basis, learner: Learner, x: Floats, force: Floats, rows: npt.NDArray[np.int64]) -> Floats:
     """Return weights (size + 1,) learned from regressors (K, size + 1) and force (N, (K,)) row by row."""
-    return _learned(basis, learner, x, force, rows)[0]
+    return learned_with_state(basis, learner, x, force, rows)[0]
 
 
-def _learned(
+def learned_with_state(
     basis: Basis, learner: Learner, x: Floats, force: Floats, rows: npt.NDArray[np.int64]
 ) -> tuple[Floats, Floats]:
-    """Return the weights, and the learner's state then."""
+    """Return weights (size + 1,) learned row by row, and the learner's state then."""
     scales = np.append(basis.scales(), x[0, -1])
     w = np.zeros(x.shape[1])
     vector, state = learner.vector(scales), learner.initial_state(scales)
@@ -175,17 +171,15 @@ def choose(plain: IntervalBasis, learner: Learner, motion: Motion, blocks: int =
 
     Notes say what was left off, and why. Nothing is raised for little data: the symmetric operator is left.
     """
-    rows = _gated(motion)
+    rows = gated(motion)
     parts_of_time = np.array_split(rows, blocks)
     left: list[str] = []
     tried: list[Candidate] = []
-    skew = (
-        _best_skew(plain, learner, motion, rows, parts_of_time) if rows.size >= _needed(plain.size) else 0.0
-    )
+    skew = _best_skew(plain, learner, motion, rows, parts_of_time) if rows.size >= needed(plain.size) else 0.0
     amounts, ends = tuple(dict.fromkeys((0.0, skew))), plain.size - 1
     lies = {(0, amount): Placed(plain.widths, (plain.widths,) * blocks) for amount in amounts}
     unmoved = ""
-    for amount in amounts if ends and rows.size >= _needed(plain.size + ends) else ():
+    for amount in amounts if ends and rows.size >= needed(plain.size + ends) else ():
         moved = _placed(plain, learner, motion, amount, parts_of_time)
         if isinstance(moved, Placed):
             lies[ends, amount] = moved
@@ -194,8 +188,8 @@ def choose(plain: IntervalBasis, learner: Learner, motion: Motion, blocks: int =
     for parts in LADDER:
         for places in dict.fromkeys((0, ends)):
             size = ShapedIntervalBasis(plain.widths, parts).size + places
-            if (parts or places) and rows.size < _needed(size):
-                left.append(f"{' + '.join([*([PLACED] if places else []), *parts])} ({_needed(size)})")
+            if (parts or places) and rows.size < needed(size):
+                left.append(f"{' + '.join([*([PLACED] if places else []), *parts])} ({needed(size)})")
                 break
             for amount in amounts:
                 if (at := lies.get((places, amount))) is not None:
@@ -210,45 +204,25 @@ def choose(plain: IntervalBasis, learner: Learner, motion: Motion, blocks: int =
     elif unmoved:
         notes.append(f"intervals lie as configured: {unmoved}")
     if left:
-        notes.append(
-            f"left off for want of data, {rows.size} updates: {', '.join(left)}, in brackets how many it "
-            "takes; record longer, make identify.gate smaller, or take fewer intervals"
-        )
+        notes.append(left_off(rows.size, left))
     scales = np.append(found.scales(), found.scales().mean())
     model = HysteresisModel(found, w[:-1], float(w[-1] * scales[-1]))
     return Choice(model, chosen, lambda: learner.information(state, scales), tried, notes)
 
 
-def that_pays(
-    config: Configuration, model: HysteresisModel, friction: Friction, window: tuple[float, float]
-) -> tuple[HysteresisModel, list[str]]:
-    """Return the model that ``identify: {model: auto}`` chooses on what was learned from, with notes.
-
-    That is `model`, the symmetric one that the loop has learned, unless a shape or other places of its
-    intervals pay. `window` (s) is when the weights might change. Any other ``identify.model`` is left as it
-    is.
-    """
-    plain, section = config.basis(), config.identify
-    if section.model != AUTO or not isinstance(plain, IntervalBasis):
-        return model, []
-    rows = friction.time <= window[1]
-    good = friction.good & (friction.time >= window[0])
-    grain = 0.5 * flicker(config.stage)  # to either side
-    motion = Motion(friction.position[rows], friction.force[rows], good[rows], section.gate, grain)
-    choice = choose(plain, config.learner(), motion)
-    basis, scale = choice.model.basis, choice.model.basis.scales().mean()
-    if isinstance(basis, IntervalBasis) and not choice.chosen.places:
-        return model, choice.notes
-    weights = np.append(choice.model.weights, choice.model.offset / scale)
-    model = completed(
-        section, basis, weights, float(scale), motion.position, config.period, choice.information
+def left_off(updates: int, left: Sequence[str]) -> str:
+    """Say what was left off for want of data, each with how many updates it takes."""
+    return (
+        f"left off for want of data, {updates} updates: {', '.join(left)}, in brackets how many it takes; "
+        "record longer, make identify.gate smaller, or take fewer intervals"
     )
-    return model, choice.notes
 
 
 def _verdict(chosen: Candidate, tried: Sequence[Candidate]) -> str:
     best, plain = min(tried, key=lambda c: c.rms), tried[0]
-    says = f"model {chosen}: held-out error {chosen.rms:.3g} N, the symmetric operator's {plain.rms:.3g} N"
+    says = f"model {chosen}: held-out error {chosen.rms:.3g} N"
+    if chosen is not plain:
+        says += f", the symmetric operator's {plain.rms:.3g} N"
     if best is not chosen:
         says += f"; {best} has {best.rms:.3g} N with {best.holds} for {chosen.holds}: does not pay"
     return says
@@ -277,11 +251,12 @@ def _placed(
     return placed(plain, learner, seen, motion.force, motion.good, motion.gate, blocks)
 
 
-def _needed(weights: int) -> int:
+def needed(weights: int) -> int:
+    """Return how many updates it takes to learn so many weights."""
     return ROWS_A_WEIGHT * weights
 
 
-def _gated(motion: Motion) -> npt.NDArray[np.int64]:
+def gated(motion: Motion) -> npt.NDArray[np.int64]:
     """Return the rows at which the axis has moved by the gate since the last, as the loop takes them."""
     rows, last = [], motion.position[0]
     for k, (u, good) in enumerate(zip(motion.position.tolist(), motion.good.tolist(), strict=True)):
@@ -298,16 +273,18 @@ def _fitted(
     """Return the basis, the shape of its output as learned, its weights, and the state of the learner."""
     if not parts and not skew:
         plain = IntervalBasis(widths)
-        return plain, *_learned(plain, learner, with_offset(plain, motion.position), motion.force, rows)
+        return plain, *learned_with_state(
+            plain, learner, with_offset(plain, motion.position), motion.force, rows
+        )
     grain = motion.grain if skew else 0.0
     basis = ShapedIntervalBasis(widths, parts, skew=skew, grain=grain)
-    w, state = _learned(basis, learner, with_offset(basis, motion.position), motion.force, rows)
+    w, state = learned_with_state(basis, learner, with_offset(basis, motion.position), motion.force, rows)
     for _ in range(_ROUNDS if "output" in parts else 0):
         slopes = w[: widths.size]
         if not float(slopes @ widths) > 0.0:
             break
         basis = ShapedIntervalBasis(widths, parts, skew=skew, grain=grain, shape=slopes)
-        w, state = _learned(basis, learner, with_offset(basis, motion.position), motion.force, rows)
+        w, state = learned_with_state(basis, learner, with_offset(basis, motion.position), motion.force, rows)
     return basis, w, state
 
 
