@@ -108,6 +108,6 @@ def contradictions(limits: Limits, stage: Stage, device: Mapping[str, Any]) -> I
         whose = "limits.voltage" if limits.voltage is not None else "the stage's voltage_limit"
         says = (
             f"{its_own:g} V is less than {whose} ({most:g} V): what the device cuts off would be taken for "
-            f"force; set limits.voltage to {its_own:g} V or less"
+            f"force; set limits.voltage to {its_own:g} V, or raise this one"
         )
         yield ("device", "voltage_limit"), says

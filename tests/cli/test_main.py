@@ -84,6 +84,13 @@ def test_version() -> None:
     assert rtcomp("--version").stdout == f"rtcomp {__version__}\n"
 
 
+def test_the_package_is_the_command() -> None:
+    module = [sys.executable, "-m", "rtcomp"]
+    run = subprocess.run([*module, "simlate"], capture_output=True, text=True, timeout=60, check=False)
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr == "error: no command 'simlate'; did you mean simulate? see rtcomp --help\n"
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [

@@ -1,0 +1,10 @@
+"""`python -m rtcomp` is `rtcomp`."""
+
+from __future__ import annotations
+
+import sys
+
+from rtcomp.cli.main import main
+
+if __name__ == "__main__":
+    sys.exit(main())
