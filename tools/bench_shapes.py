@@ -296,6 +296,7 @@ def rig(cycles: int = 10) -> tuple[list[Figure], list[dict[str, Any]]]:
         Figure("ideal rig, three cycles", ideal, "%", "", "shape and places chosen by themselves"),
         Figure("failing rig, three cycles, symmetric", errors["failing, symmetric"][2], "%"),
         Figure("failing rig, three cycles", flawed_three, "%", f"<= {2 * as_the_paper:.4g}", verdict),
+        Figure("failing rig over ideal rig, three cycles", flawed_three / ideal, "", "<= 2", "both by auto"),
         Figure(f"failing rig, {cycles} cycles", many, "%", "", "all of one amplitude"),
         Figure("failing rig, cycles to 5 %", float(needed), "", "<= 3"),
     ], rows_of_rivals
