@@ -120,6 +120,14 @@ class CanLink:
         """Lines of an slcan adapter that were no frame, so far."""
         return getattr(self.bus, "damaged", 0)
 
+    @property
+    def doubt(self) -> str:
+        """What to ask about the port where nobody answers; empty where it is no serial port."""
+        if self._port is None:
+            return ""
+        told = f", {self.damaged} lines came that are no frames" if self.damaged else ""
+        return f"{told}; is it an slcan adapter?"
+
     def receive(self, seconds: float) -> can.Message | None:
         """Return the oldest frame not yet received, waiting at most `seconds`; None where none comes.
 

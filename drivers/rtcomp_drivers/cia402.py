@@ -224,7 +224,7 @@ class Cia402Driver(Driver):
         try:
             device_type = drive.read(0x1000)
         except DeviceTimeoutError:
-            raise self._nobody(drive) from None
+            raise self._nobody(talk, drive) from None
         check_profile(drive, device_type)
         if drive.has(0x1008):
             with contextlib.suppress(DeviceError):  # a drive without a name
@@ -254,12 +254,13 @@ class Cia402Driver(Driver):
                 f"{drive.who}: its adapter's latency timer is {timer} ms; samples will be late"
             )
 
-    def _nobody(self, drive: Drive) -> DeviceTimeoutError:
+    def _nobody(self, talk: Talk, drive: Drive) -> DeviceTimeoutError:
         others = drive.others()
+        doubt = "" if others else talk.link.doubt
         hint = f"nodes that do: {', '.join(map(str, others))}" if others else "nor does any other node"
         return DeviceTimeoutError(
             f"{drive.who}: does not answer at {self.settings.bitrate} bit/s, {hint}; check node, bit rate, "
-            "power and termination"
+            f"power and termination{doubt}"
         )
 
     def _reason(self, talk: Talk, drive: Drive) -> str:

@@ -115,7 +115,7 @@ class OdriveLink:
             else:
                 advice = (
                     "nothing at all was heard; check power, wiring, the two 120 ohm terminations, that the "
-                    f"bit rate is {self.can.bitrate} there too, and that heartbeats are on"
+                    f"bit rate is {self.can.bitrate} there too, and that heartbeats are on{self.can.doubt}"
                 )
             raise DeviceTimeoutError(f"{self.who}: no heartbeat in {patience:g} s; {advice}")
         self.check_alone()

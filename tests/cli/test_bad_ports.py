@@ -208,4 +208,4 @@ def test_a_port_that_is_no_can_adapter(folder: Path, drive: str) -> None:
             quick = "connect_timeout: 0.5"
             device = f"{{driver: {drive}, interface: slcan, channel: {port}, {CAN[drive]}, {quick}}}"
             (folder / "run.yaml").write_text(configuration(device))
-            refused(*arguments("identify"), at=folder, says=[port])
+            refused(*arguments("identify"), at=folder, says=[port, "is it an slcan adapter?"])
