@@ -47,9 +47,8 @@ OPEN = 4.0
 """Squared error over the floor's, from which on something remains that no entry explains."""
 LOUD = 0.03
 """Relative force error left by noise and method, from which on forces decide nothing where an axis sticks."""
-KEPT, CLEARLY = 0.9, 0.6
-"""Factors on the held-out error below which a retuned stage is given in place of the believed one: where it
-explains what was seen, and where much is left open, whose cause it would only have bent to."""
+KEPT = 0.9
+"""Factor on the held-out error below which a retuned stage is given in place of the believed one."""
 ROUGH = (0.75, 1.0, 1.3)
 """Factors on the believed reaches with which the place of the mismatch is looked for at first."""
 
@@ -94,7 +93,8 @@ def diagnose(
         # Forces name nothing, and in many rows friction cannot be told from the motion: they are no judge.
         return told_by_position(stage, recordings, motion, base, unseen_sticking, say, seed)
     extended, entries_found = told.stage, told.entries
-    if not named and fit.after > (CLEARLY if _open(final, least) else KEPT) * fit.before:
+    # What is bent to an unknown cause may do far worse on other motion, however well it does on this one.
+    if not named and (_open(final, least) or fit.after > KEPT * fit.before):
         extended = stage
         fit = Fit(fit.before, fit.retuned, fit.before, fit.floor)
     say(0.4, "locate")
