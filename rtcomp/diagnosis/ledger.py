@@ -23,12 +23,11 @@ from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place
 from rtcomp.physics.closing import ClosingBranches
 from rtcomp.physics.maxwell_slip import MaxwellSlip
-from rtcomp.stage.balance import STEADY, around_rows, forces
+from rtcomp.stage.balance import PARTS, STEADY, around_rows, forces
 from rtcomp.stage.stage import Stage
 
 MASS, VISCOUS, MICRO, BIAS = "mass", "viscous", "micro_damping", "bias"
 BIASES = ("constant-force", "gravity", "drive-offset")
-PARTS = 8
 GRID = 14
 """Reaches of the grid where the believed friction is not a short list of elements."""
 

@@ -7,7 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtcomp.stage.balance import bandwidth, force_balance, known_force, true_position, zero_phase
+from rtcomp import physics
+from rtcomp.stage.balance import (
+    PARTS,
+    bandwidth,
+    force_balance,
+    forces,
+    known_force,
+    true_position,
+    zero_phase,
+)
 from rtcomp.stage.simulate import Simulator
 from rtcomp.stage.stage import Stage
 
@@ -89,6 +98,20 @@ def test_the_wrong_mass_shows_in_proportion():
 
 def test_noise_of_an_interferometer_leaves_the_balance_useful():
     assert force_balance(LEUVEN, *recorded(LEUVEN)).relative_error < 0.05
+
+
+@pytest.mark.parametrize("constant", [0.5e-3, 3e-3, 2e-2])
+def test_the_force_of_a_lag_over_a_row_is_its_mean(constant):
+    row, count = 1e-3, 40
+    lag = [physics.build({"name": "drive-lag", "time_constant": constant})]
+    chain = [*(e for e in QUIET.chain if e.name == "drive-force"), *lag]
+    time, still = row * np.arange(count + 1), np.zeros(count + 1)
+    chain.sort(key=lambda e: e.order)
+    given = forces(QUIET, chain, time, still, still, still, np.append(0.0, np.ones(count)), parts=PARTS).drive
+    fall = np.exp(-time / constant)
+    mean = 1.0 + constant / row * np.diff(fall)
+    at = QUIET.force_constant
+    np.testing.assert_allclose(given[1:] / at, mean, atol=0.51 * row / constant / PARTS)
 
 
 def test_the_bandwidth_is_what_is_told(quiet):
