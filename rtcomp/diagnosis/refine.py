@@ -20,8 +20,8 @@ from rtcomp.physics.growing import GROWTH
 
 SCALING = ("drive-gain", "sensor-scale", "inertia")
 """Entries that do what other believed numbers would do together."""
-SEARCHED = ("time", "closing")
-"""Parameters that the search settles: a jump is between two rows, branches close or do not."""
+SEARCHED = ("time",)
+"""Parameters that the search settles, beside choices: a jump is between two rows."""
 BETWEEN = (0.02, 0.98)
 """Range of a stiffening that is refined."""
 BELIEF = 3e-4
@@ -79,7 +79,7 @@ def knobs_of(entries: Sequence[Entry], motion: Motion, which: Sequence[int] | No
                 continue
             size = abs(float(value))
             step = 0.01 * size
-            if parameter.name in SEARCHED:
+            if parameter.name in SEARCHED or parameter.choice:
                 continue
             if parameter in GROWTH:
                 step = 0.05 if 0.0 < float(value) < 1.0 else 0.0  # else the search has settled it

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.closing import ASYMMETRY, ClosingBranches
@@ -60,7 +59,13 @@ class AsymmetricFriction(Effect):
     parameters = (
         ASYMMETRY,
         Parameter(
-            "closing", "1", 0.0, 1.0, "1: every loop closes, 0: small ones move to the stiffer side", 0.0
+            "closing",
+            "1",
+            0.0,
+            1.0,
+            "1: every loop closes, 0: small ones move to the stiffer side",
+            0.0,
+            choice=True,
         ),
     )
     kernel = asymmetric_friction
@@ -73,12 +78,6 @@ class AsymmetricFriction(Effect):
     neutral = {"asymmetry": 0.0}
     order = 40
     states = 1
-
-    def __init__(self, **values: float) -> None:
-        super().__init__(**values)
-        closing = self.values["closing"]
-        if closing not in (0.0, 1.0):
-            raise ConfigError(f"{self.name}: closing is {closing:g}; allowed is 0 or 1", key=("closing",))
 
     def companions(self) -> list[Effect]:
         """Return what bends the branches, where they close."""

@@ -80,6 +80,8 @@ class Parameter:
     default: float | None = None
     open_low: bool = False
     """True where `low` itself is not allowed (a period of zero, say)."""
+    choice: bool = False
+    """True where only `low` and `high` are allowed: which of two kinds it is, no size that a fit moves."""
 
     def check(self, value: Any, owner: str) -> float:
         """Return `value` as a float, or raise ConfigError naming the parameter, the value and the range."""
@@ -94,6 +96,11 @@ class Parameter:
             raise ConfigError(
                 f"{owner}: {self.name} is {number:g} {self.unit}; "
                 f"allowed is {bracket}{self.low:g}, {self.high:g}]",
+                key=(self.name,),
+            )
+        if self.choice and number not in (self.low, self.high):
+            raise ConfigError(
+                f"{owner}: {self.name} is {number:g}; allowed is {self.low:g} or {self.high:g}",
                 key=(self.name,),
             )
         return number

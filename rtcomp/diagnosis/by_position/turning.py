@@ -115,12 +115,14 @@ class Setting:
                 found += [
                     Knob(-1, f"{name}.{p.name}", "log", 1.0, *OF_EFFECTS)
                     for p in known
-                    if isinstance(effect.get(p.name), int | float) and effect[p.name] and p.name not in FIXED
+                    if isinstance(effect.get(p.name), int | float)
+                    and effect[p.name]
+                    and not (p.choice or p.name in FIXED)
                 ]
         for i, entry in enumerate(self.entries):
             for p in catalogue.entry(str(entry["name"])).parameters:
                 value = entry.get(p.name)
-                if isinstance(value, int | float) and value != 0:
+                if isinstance(value, int | float) and value != 0 and not p.choice:
                     found.append(_knob(i, p, float(value), self.longest))
         return found
 
