@@ -119,13 +119,9 @@ def _quickly(current: Fitted, motion: Motion, entries: list[Entry], screened: Sc
         except (ConfigError, np.linalg.LinAlgError):
             continue
     found.sort(key=lambda r: float(r.errors.sum()) * _handicap(r.entries[-1]))
-    open_still = [r for r in found[1:] if r.entries[-1]["name"] in UNDECIDED]
-    return [*found[:1], *(r for r in open_still if _by_kind(r) != _by_kind(found[0]))][:2]
-
-
-def _by_kind(refined: Refined) -> object:
-    """Return what tells the forms of an entry apart that a few steps leave open."""
-    return refined.entries[-1].get(UNDECIDED.get(str(refined.entries[-1]["name"]), ""))
+    kind = UNDECIDED.get(screened.name)
+    others = [r for r in found if kind and r.entries[-1].get(kind) != found[0].entries[-1].get(kind)]
+    return [*found[:1], *others[:1]]
 
 
 def _handicap(entry: Entry) -> float:

@@ -20,7 +20,7 @@ from rtcomp.jobs.lead import NOTHING, lead_volts
 from rtcomp.jobs.motion_notes import motion_notes
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
 from rtcomp.jobs.session import Run, Watch, check, make_device, make_tick, run_loop, stopped
-from rtcomp.jobs.shape_that_pays import that_pays
+from rtcomp.jobs.shape.that_pays import that_pays
 from rtcomp.kernels import Floats
 from rtcomp.loop.device import Armable, Device
 from rtcomp.loop.tick import Tick

@@ -50,8 +50,8 @@ class AsymmetricFriction(Effect):
 
     With `closing` 1 the branches as such differ: how far one has come from its reversal to where it leads is
     bent, so that it begins 1 + asymmetry times as steep forward, 1 - asymmetry backward, and every loop
-    closes (`ClosingBranches`). Loops that stay small are then next to symmetric. Only loops that slide on
-    neither side tell the two apart.
+    closes (`ClosingBranches`). Loops that stay small are then next to symmetric. Loops that slide on
+    neither side tell the two apart best.
     """
 
     name = "asymmetric-friction"

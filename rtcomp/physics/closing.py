@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from typing import Final
 
-import numpy as np
-
 from rtcomp.kernels import Floats, compiled, effect_kernel
 from rtcomp.physics.effect import Effect, Parameter, Place
 from rtcomp.physics.wires import FRICTION, GRIP, GRIP_LEVEL, REACH, SCALE
@@ -108,7 +106,3 @@ class ClosingBranches(Effect):
     neutral = {"asymmetry": 0.0}
     order = 70
     states = TURNS + 2 * DEPTH
-
-    def initial_state(self) -> Floats:
-        """Return the memory of contacts that never moved."""
-        return np.zeros(self.states)

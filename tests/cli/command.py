@@ -141,3 +141,21 @@ def in_a_terminal(*arguments: object, at: Path) -> str:
     """Run `rtcomp` in the folder `at` on a terminal 100 columns wide; return all that it showed."""
     command = [RTCOMP, *map(str, arguments)]
     return on_terminal(command, at=at, environment={**environment(), "TERM": "xterm"}, columns=100).text
+
+
+def arguments(command: str, config: str = "run.yaml") -> list[str]:
+    """What is given to `command` so that it reads `config`."""
+    if command == "replay":
+        return ["replay", "recording.csv", "--stage", config, "--out", "replay.csv", "--json"]
+    if command == "plant":
+        return ["plant", "serve", "--config", config, "--json"]
+    return [command, config, "--out", "results", "--force", "--json"]
+
+
+def with_earlier_results(path: Path) -> Path:
+    """Fill a folder with a recording and the results of earlier runs, which must survive; return it."""
+    (path / "results").mkdir()
+    (path / "results" / "recording.h5").write_bytes(b"of an earlier run")
+    (path / "results" / "model.yaml").write_text("of an earlier run\n")
+    write(path / "recording.csv", motion(100))
+    return path

@@ -1,4 +1,4 @@
-"""Configurations, models and outputs that cannot be used: one line that says where and what, nothing lost.
+"""Configurations, models and options that cannot be used: one line that says where and what, nothing lost.
 
 Each case is tried on one command by default and on every other command that reads the file when slow tests
 run.
@@ -7,11 +7,18 @@ run.
 from __future__ import annotations
 
 import itertools
-import json
 from pathlib import Path
 
 import pytest
-from command import CONFIG, listing, motion, one_error_line, refused, rtcomp, write
+from command import (
+    CONFIG,
+    arguments,
+    motion,
+    refused,
+    rtcomp,
+    with_earlier_results,
+    write,
+)
 
 LOOPS = ("identify", "compensate", "simulate")
 ALL = (*LOOPS, "replay", "plant")
@@ -128,23 +135,9 @@ def each(cases: list[tuple[str, str, list[str], tuple[str, ...]]]) -> list[objec
     ]  # fmt: skip
 
 
-def arguments(command: str, config: str = "run.yaml") -> list[str]:
-    """What is given to `command` so that it reads `config`."""
-    if command == "replay":
-        return ["replay", "recording.csv", "--stage", config, "--out", "replay.csv", "--json"]
-    if command == "plant":
-        return ["plant", "serve", "--config", config, "--json"]
-    return [command, config, "--out", "results", "--force", "--json"]
-
-
 @pytest.fixture()
 def folder(tmp_path: Path) -> Path:
-    """A folder with results of earlier runs, which must survive."""
-    (tmp_path / "results").mkdir()
-    (tmp_path / "results" / "recording.h5").write_bytes(b"of an earlier run")
-    (tmp_path / "results" / "model.yaml").write_text("of an earlier run\n")
-    write(tmp_path / "recording.csv", motion(100))
-    return tmp_path
+    return with_earlier_results(tmp_path)
 
 
 @pytest.mark.parametrize(("command", "old", "new", "says"), each(WRONG_KEYS))
@@ -262,58 +255,6 @@ def test_empty_friction_is_refused(folder: Path, text: str) -> None:
     assert any(words in line for words in ("is empty", "0 entries", "are empty"))
 
 
-@pytest.mark.parametrize("command", LOOPS)
-def test_an_output_that_exists_is_replaced_only_when_asked(folder: Path, command: str) -> None:
-    (folder / "run.yaml").write_text(CONFIG)
-    given = [word for word in arguments(command) if word != "--force"]
-    refused(*given, at=folder, says=["results exists and is not empty", "--force"])
-    (folder / "file").write_text("mine")
-    for force in ([], ["--force"]):
-        refused(command, "run.yaml", "--out", "file", *force, at=folder, says=["file is a file"])
-    run = rtcomp(*arguments(command), at=folder)
-    assert (run.returncode, run.stderr) == (0, "")
-    assert json.loads(run.stdout)["out"] == "results"
-    name = "with.h5" if command == "compensate" else "recording.h5"
-    assert readable_rows(folder / "results" / name) > 1000
-
-
-@pytest.mark.parametrize("command", ["replay", "convert"])
-def test_an_output_file_that_exists_is_replaced_only_when_asked(folder: Path, command: str) -> None:
-    (folder / "run.yaml").write_text(CONFIG)
-    (folder / "replay.csv").write_text("mine")
-    given = arguments("replay") if command == "replay" else ["convert", "recording.csv", "replay.csv"]
-    refused(*given, at=folder, says=["replay.csv", "exists", "--force"])
-    (folder / "recording.csv").write_text((folder / "recording.csv").read_text().replace("voltage", "volts"))
-    refused(*given, "--force", at=folder, says=["no column 'voltage'"])
-    assert (folder / "replay.csv").read_text() == "mine"
-
-
-def test_a_run_that_fails_on_the_way_leaves_the_old_results(folder: Path) -> None:
-    """A wrong sign of the feedback drives the stage out of its travel while it runs."""
-    text = CONFIG.replace("travel: [-1.0e-3, 1.0e-3]", "travel: [-7.0e-5, 7.0e-5]")
-    text = text.replace("force: 0.1", "force: 30.0").replace("ki: 2.0e5", "ki: 0.0")
-    (folder / "run.yaml").write_text(text.replace("amplitude: 1.0e-4, freq", "amplitude: 5.0e-5, freq"))
-    before = listing(folder / "results")
-    run = rtcomp(*arguments("identify"), at=folder)
-    line = one_error_line(run, ["left the travel", "zero volts", "results.failed"])
-    assert "kept in results.failed" in line
-    assert listing(folder / "results") == before
-    assert readable_rows(folder / "results.failed" / "recording.h5") > 0
-    assert sorted(p.name for p in folder.iterdir()) == [
-        "recording.csv", "results", "results.failed", "run.yaml",
-    ]  # fmt: skip
-
-
-def readable_rows(path: Path) -> int:
-    """Rows of a recording that h5py reads, columns of one length."""
-    import h5py
-
-    with h5py.File(path, "r") as file:
-        lengths = {len(file[name]) for name in ("time", "position", "voltage")}
-    assert len(lengths) == 1
-    return lengths.pop()
-
-
 def test_every_case_is_tried_on_every_command() -> None:
     counted = [c for _, _, _, commands in itertools.chain(WRONG_KEYS, REFERENCES) for c in commands]
     assert set(counted) == set(ALL)
@@ -355,10 +296,3 @@ def test_a_reference_from_another_file_is_wrong_there(folder: Path, text: str, s
 def test_options_out_of_range(folder: Path, command: str, option: list[str], says: list[str]) -> None:
     (folder / "run.yaml").write_text(CONFIG)
     refused(*arguments(command), *option, at=folder, says=says)
-
-
-def test_places_that_cannot_be_written(folder: Path) -> None:
-    (folder / "run.yaml").write_text(CONFIG)
-    for out in ("/dev/null/out", "/proc/out"):
-        given = [out if word == "results" else word for word in arguments("simulate")]
-        refused(*given, at=folder, says=[f"{out} cannot be written"])

@@ -5,8 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-import subprocess
-import sys
 import threading
 import tty
 from collections.abc import Callable, Iterator
@@ -16,14 +14,8 @@ import h5py
 import numpy as np
 import pytest
 from command import listing, one_error_line, refused
+from held_port import held
 from running import Plant, Running, configuration, link
-
-HOLDER = """
-import serial, sys
-port = serial.Serial(sys.argv[1], exclusive=True)
-print("held", flush=True)
-sys.stdin.read()
-"""
 
 
 @pytest.fixture()
@@ -94,14 +86,8 @@ def test_what_is_no_serial_port(folder: Path, command: str) -> None:
 def test_a_port_that_another_process_holds(folder: Path, command: str) -> None:
     with terminal() as port:
         use(folder, port)
-        holder = subprocess.Popen(
-            [sys.executable, "-c", HOLDER, port], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-        )
-        assert holder.stdout is not None and holder.stdout.readline() == b"held\n"
-        try:
+        with held(port):
             refused(*arguments(command), at=folder, says=[port, "is busy", "another program has it open"])
-        finally:
-            holder.communicate()
 
 
 @COMMANDS
@@ -190,14 +176,8 @@ def test_an_adapter_that_another_program_has(folder: Path, drive: str) -> None:
     with terminal() as port:
         device = f"{{driver: {drive}, interface: slcan, channel: {port}, {CAN[drive]}}}"
         (folder / "run.yaml").write_text(configuration(device))
-        holder = subprocess.Popen(
-            [sys.executable, "-c", HOLDER, port], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-        )
-        assert holder.stdout is not None and holder.stdout.readline() == b"held\n"
-        try:
+        with held(port):
             refused(*arguments("identify"), at=folder, says=[port, "busy"])
-        finally:
-            holder.communicate()
 
 
 @pytest.mark.parametrize("drive", CAN)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 import random
 import select
-import subprocess
-import sys
 import threading
 import time
 import tty
 
 import pytest
+from held_port import held
 from rtcomp_drivers import protocol
 from rtcomp_drivers.driver import Bench
 from rtcomp_drivers.protocol import ARMED, FAULT
@@ -73,16 +72,8 @@ def test_ports_that_are_none(tmp_path):
 
 def test_a_port_that_another_process_holds(pty_board):
     board = pty_board()
-    script = (
-        "import serial, sys; p = serial.Serial(sys.argv[1], exclusive=True);"
-        "print('held', flush=True); sys.stdin.read()"
-    )
-    with subprocess.Popen(
-        [sys.executable, "-c", script, board.port], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    ) as holder:
-        assert holder.stdout.readline() == b"held\n"
+    with held(board.port):
         refused(DeviceBusyError, board.port, "busy")
-        holder.stdin.close()
     with serial(board.port):
         refused(DeviceBusyError, board.port, "busy")
     with serial(board.port) as again:

@@ -16,7 +16,7 @@ from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.learner import Learner
 from rtcomp.hysteresis.rls import Rls
 from rtcomp.hysteresis.shaped import ShapedIntervalBasis
-from rtcomp.jobs.shapes import learned, with_offset
+from rtcomp.jobs.shape.choice import learned, with_offset
 from rtcomp.kernels import Floats
 
 Make = Callable[[float], Basis]

@@ -6,13 +6,12 @@ import itertools
 import os
 import socket
 import stat
-import subprocess
-import sys
 import threading
 import time
 
 import can
 import pytest
+from held_port import held
 from refusals import in_one_line
 from rtcomp_drivers import can_link
 from rtcomp_drivers.can_link import CanLink, CanSettings, check_interface, check_socketcan, configured
@@ -138,16 +137,8 @@ def test_an_adapter_that_does_not_read_blocks_nobody(adapter):
 
 
 def test_a_port_that_is_used_already(adapter):
-    script = (
-        "import serial, sys; p = serial.Serial(sys.argv[1], exclusive=True);"
-        "print('held', flush=True); sys.stdin.read()"
-    )
-    with subprocess.Popen(
-        [sys.executable, "-c", script, adapter.port], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    ) as holder:
-        assert holder.stdout.readline() == b"held\n"
+    with held(adapter.port):
         refused(DeviceBusyError, adapter.port, "busy", channel=adapter.port)
-        holder.stdin.close()
     made = link(channel=adapter.port)
     refused(DeviceBusyError, "busy", channel=adapter.port)
     made.close()

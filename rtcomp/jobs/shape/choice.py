@@ -23,7 +23,7 @@ from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.learner import Learner
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.hysteresis.shaped import ShapedIntervalBasis, as_skewed
-from rtcomp.jobs.placed import Placed, placed
+from rtcomp.jobs.shape.placed import Placed, placed
 from rtcomp.kernels import Floats, call_learner, compiled
 
 LADDER: tuple[tuple[str, ...], ...] = (

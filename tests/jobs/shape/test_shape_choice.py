@@ -15,8 +15,8 @@ from rtcomp.hysteresis.rls import Rls
 from rtcomp.hysteresis.shaped import ShapedIntervalBasis
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
-from rtcomp.jobs.placed import placed
-from rtcomp.jobs.shapes import Candidate, Motion, choose, smallest_that_pays
+from rtcomp.jobs.shape.choice import Candidate, Motion, choose, smallest_that_pays
+from rtcomp.jobs.shape.placed import placed
 
 PLAIN = IntervalBasis.over(8, 2.0, 3.0)
 FALL = np.exp(-2.0 * np.cumsum(PLAIN.widths) / 2.0)

@@ -15,7 +15,7 @@ from rtcomp.jobs.configuration import AUTO, Configuration
 from rtcomp.jobs.judge import Friction
 from rtcomp.jobs.known import completed
 from rtcomp.jobs.limit_settings import flicker
-from rtcomp.jobs.shapes import Motion, choose, gated, learned_with_state, left_off, needed, with_offset
+from rtcomp.jobs.shape.choice import Motion, choose, gated, learned_with_state, left_off, needed, with_offset
 from rtcomp.kernels import Floats
 
 
