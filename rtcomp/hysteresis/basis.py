@@ -46,6 +46,10 @@ class Basis:
         """Return the amplitude of each regressor when fully exercised, shape (size,); m for an input in m."""
         raise NotImplementedError
 
+    def likeness(self) -> Floats | None:
+        """Return how alike the weights are expected to be, a correlation (size, size); None if not at all."""
+        return None
+
     def memory(self, gate: float) -> Floats:
         """Return what `placing` remembers at the start; `gate` (m) is the motion between two updates."""
         return np.zeros(0)

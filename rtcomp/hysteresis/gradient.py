@@ -62,7 +62,7 @@ class Gradient(Learner):
         """Return N, step, the floor (1e-4 of the norm when all is exercised) and Gamma."""
         return np.concatenate([[scales.size, self.step, 1e-4 * scales.size], 1.0 / scales**2])
 
-    def initial_state(self, scales: Floats) -> Floats:
+    def initial_state(self, scales: Floats, likeness: Floats | None = None) -> Floats:
         """Return nothing: the estimator has no memory but the weights."""
         return np.zeros(0)
 

@@ -43,8 +43,14 @@ class Learner:
         """Return the kernel's parameters for regressors of these amplitudes; `p[0]` is their number."""
         raise NotImplementedError
 
-    def initial_state(self, scales: Floats) -> Floats:
-        """Return the kernel's state before it has learned anything."""
+    knows_likeness: ClassVar[bool] = False
+    """Whether it begins with what weights are expected to have in common (`Basis.likeness`)."""
+
+    def initial_state(self, scales: Floats, likeness: Floats | None = None) -> Floats:
+        """Return the kernel's state before it has learned anything.
+
+        `likeness` (M, M) is the correlation of the first M weights; those after them are on their own.
+        """
         raise NotImplementedError
 
     def information(self, state: Floats, scales: Floats) -> Floats:
@@ -113,7 +119,7 @@ def learn(
         basis.initial_state(),
         learner.kernel.address,
         learner.vector(scales),
-        learner.initial_state(scales),
+        learner.initial_state(scales, basis.likeness()),
         np.zeros(basis.size),
         w,
         np.ascontiguousarray(inputs, dtype=np.float64),
@@ -142,7 +148,8 @@ def learn_places(
     if offset:
         x[-1] = scales.mean()
         scales = np.append(scales, x[-1])
-    vector, params, state = basis.vector(), learner.vector(scales), learner.initial_state(scales)
+    vector, params = basis.vector(), learner.vector(scales)
+    state = learner.initial_state(scales, basis.likeness())
     moving, follow = followed(basis, learner)
     w = np.zeros(x.size)
     _learn_places(

@@ -70,7 +70,7 @@ class Lms(Learner):
         """Return N, mu = step / (sum of squared amplitudes), and step."""
         return np.array([scales.size, self.step / float(np.dot(scales, scales)), self.step])
 
-    def initial_state(self, scales: Floats) -> Floats:
+    def initial_state(self, scales: Floats, likeness: Floats | None = None) -> Floats:
         """Return nothing: LMS has no memory but the weights."""
         return np.zeros(0)
 
@@ -95,7 +95,7 @@ class Nlms(Learner):
         """Return N, step, and a floor of 1e-4 of the squared amplitudes against division by nothing."""
         return np.array([scales.size, self.step, FLOOR * float(np.dot(scales, scales))])
 
-    def initial_state(self, scales: Floats) -> Floats:
+    def initial_state(self, scales: Floats, likeness: Floats | None = None) -> Floats:
         """Return nothing: NLMS has no memory but the weights."""
         return np.zeros(0)
 

@@ -15,7 +15,7 @@ from rtcomp.kernels import Floats
 from rtcomp.yamlfile import dump_yaml, load_yaml
 
 VERSION = 1
-_NUMBERS = ("offset", "travel", "reach", "divisions", "places", "groups", "skew", "grain")
+_NUMBERS = ("offset", "travel", "reach", "divisions", "places", "groups", "skew", "grain", "smooth")
 _LISTS = ("weights", "reached", "widths", "reaches", "shape")
 _COMMENTS = {"widths": "m, of each interval", "weights": "N/m, of each regressor", "offset": "N"}
 

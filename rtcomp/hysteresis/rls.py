@@ -135,6 +135,7 @@ class Rls(Learner):
 
     name = "rls"
     kernel = rls
+    knows_likeness = True
     regroup = rls_regroup
     source = (
         "Ljung and Soderstrom (1983); bounded forgetting after Salgado, Goodwin, Middleton (1988); drift as "
@@ -159,9 +160,14 @@ class Rls(Learner):
         caps = (self.trust / scales) ** 2
         return np.concatenate([[scales.size, self.forgetting], caps, [self.trust**2, self.drift**2]])
 
-    def initial_state(self, scales: Floats) -> Floats:
-        """Return the initial covariance, diagonal, and room for scratch."""
-        return np.concatenate([np.diag((self.trust / scales) ** 2).ravel(), np.zeros(2 * scales.size + 3)])
+    def initial_state(self, scales: Floats, likeness: Floats | None = None) -> Floats:
+        """Return the initial covariance, diagonal but for what is alike, and room for scratch."""
+        n = scales.size
+        alike = np.eye(n)
+        if likeness is not None:
+            alike[: len(likeness), : len(likeness)] = likeness
+        deviation = self.trust / scales
+        return np.concatenate([(alike * np.outer(deviation, deviation)).ravel(), np.zeros(2 * n + 3)])
 
     def information(self, state: Floats, scales: Floats) -> Floats:
         """Return the inverse of the covariance."""

@@ -12,24 +12,23 @@ the paper's operator need not know where, its weights being constant, but the st
     position    B_m(p_j) - B_m(p_k) for a group of intervals: a weight that depends on the place in the range
     reversible  B_m(z): the same for intervals of no width, a single-valued curve of the deflection
     output      o^2 and o |o|: the output bends itself, o in [-1, 1] being that of falling weights
+    branches    by how much o leans, in two forms, and that times |o|: branches up and down that differ, see
+                `madelung`
 
 B_m(q) is the integral from 0 to q of the hat function about the m-th of `places` points of the range, so that
 weights vary linearly between points; the hat in the middle is left out, for the sum of all of them is xi
-itself. All three are brought to the amplitude a / 2 of an interval of the mean width, so that gradients
+itself. All are brought to the amplitude a / 2 of an interval of the mean width, so that gradients
 learn them as fast. Position (with reversible) is the Preisach model, whose loops may be asymmetric but are
-congruent; output makes them non-congruent, as Kuhnen's dead zones do.
+congruent; output makes them non-congruent, as Kuhnen's dead zones do. Branches make them asymmetric from the
+reversal on, wherever it was; loops close all the same.
 
-`skew` differs in kind: displacements count (1 + skew) times forward and (1 - skew) times backward before
-they reach the operator, which is then stiffer in one direction, up to the same level. A small loop does not
-close then: it ratchets towards the stiffer side until everything slides there, which bounds it, and closes
-from then on. It is 0 unless asked for. Motion back and forth within `grain`, the noise of the position, has
-no direction: it would ratchet without end. A turn counts neither way until it has gone twice the grain; then
-it was no noise, and all of the way since counts.
+`skew` differs in kind: the operator sees a motion that counts more in one direction, see `skew`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from inspect import signature
 from typing import Any
 
 import numpy as np
@@ -37,16 +36,24 @@ import numpy as np
 from rtcomp.errors import ConfigError, nearest
 from rtcomp.hysteresis.basis import Basis, checked_keys, register_basis
 from rtcomp.hysteresis.interval import AMOUNTS, INPUT, STARTED, IntervalBasis, advance
+from rtcomp.hysteresis.madelung import FORMS, LEANS, STATES, lean
+from rtcomp.hysteresis.skew import beyond_grain
+from rtcomp.hysteresis.smoothness import Term, correlation
 from rtcomp.kernels import Floats, basis_kernel, compiled
 
-PARTS = ("reversible", "position", "output")
+PARTS = ("reversible", "position", "output", "branches")
+USUAL = PARTS[:3]
+"""The parts unless told."""
+BY_OUTPUT = ("output", "branches")
+"""Parts that know the output, and so take a shape of it."""
 PLACES, GROUPS = 5, 4
 """Points of the range at which weights may differ, and groups of intervals whose weights do, unless told."""
-SKEW, GRAIN, SPACING, UNIT, REVERSIBLE, CELLS, OUTPUT, TABLE = range(8)
+SKEW, GRAIN, SPACING, UNIT, REVERSIBLE, CELLS, OUTPUT, BRANCHES, TABLE = range(9)
 """Places in the parameters, after N and the widths: skew (1); grain (m); distance of two points (m); a / 2
-(m); number of reversible regressors, and of cells; whether output is on. From here on point (m) and gain (1)
-of each reversible regressor; first interval, interval after the last, point (m) and gain (1) of each cell;
-the shape c_i (1/m) of the output."""
+(m); number of reversible regressors, and of cells; whether output and branches are on. From here on point
+(m) and gain (1) of each reversible regressor; first interval, interval after the last, point (m) and gain
+(1) of each cell; the shape c_i (1/m) of the output."""
+_SETTINGS = ("parts", "places", "groups", "skew", "grain", "shape", "smooth")
 _FALL = 3.0
 """Over the range the shape of the output falls by exp(-3), unless told."""
 _WORTH = 0.1
@@ -63,41 +70,13 @@ def integral(q: float, point: float, spacing: float) -> float:
     return spacing * total
 
 
-@compiled
-def beyond_grain(s: Floats, at: int, step: float, grain: float) -> float:
-    """Return how far (m, either way) a step (m) goes beyond the grain (m), within which motion is noise.
-
-    s[at]: the place within the grain (m); s[at + 1]: the direction of motion beyond it (1; 0 before there was
-    any). A turn that goes twice the grain was no noise: it counts from where it began.
-    """
-    inside = s[at] + step
-    s[at] = min(max(inside, -grain), grain)
-    way = inside - s[at]
-    if way == 0.0:
-        return 0.0
-    direction = 1.0 if way > 0.0 else -1.0
-    if s[at + 1] != direction:
-        way += direction * (grain - s[at + 1] * direction * grain)
-        s[at + 1] = direction
-    return float(abs(way))
-
-
-@compiled
-def as_skewed(inputs: Floats, skew: float, grain: float) -> Floats:
-    """Return the motion (m, (K,)) that a symmetric operator must see to be one of such a skew (1)."""
-    seen, state = inputs.copy(), np.zeros(2)
-    for k in range(1, inputs.size):
-        step = inputs[k] - inputs[k - 1]
-        seen[k] = seen[k - 1] + step + skew * beyond_grain(state, 0, step, grain)
-    return seen
-
-
 @basis_kernel
 def shaped_interval_operator(p: Floats, s: Floats, x: Floats, u: float) -> None:
     """p: N, widths (m), then the places above. s: the interval operator's, the last input (m), the
-    place within the grain (m), the direction of motion beyond it (1; 0 before there was any).
+    place within the grain (m), the direction of motion beyond it (1; 0 before there was any), and with
+    branches what `madelung` keeps.
 
-    x: xi_i, reversible, cells, output (m). A step costs all intervals and all that is added.
+    x: xi_i, reversible, cells, output, branches (m). A step costs all intervals and all that is added.
     """
     count = int(p[0])
     at = 1 + count
@@ -139,22 +118,31 @@ def shaped_interval_operator(p: Floats, s: Floats, x: Floats, u: float) -> None:
         x[out] = p[entry + 3] * (integral(outer, point, spacing) - integral(inner, point, spacing))
         out += 1
         entry += 4
+    if p[at + OUTPUT] == 0.0 and p[at + BRANCHES] == 0.0:
+        return
+    o = 0.0
+    for j in range(count):
+        o += p[entry + j] * x[j]
     if p[at + OUTPUT] > 0.0:
-        o = 0.0
-        for j in range(count):
-            o += p[entry + j] * x[j]
         x[out] = p[at + UNIT] * o * o
         x[out + 1] = p[at + UNIT] * o * abs(o)
+        out += 2
+    if p[at + BRANCHES] > 0.0:
+        lean(s, last + 3, o)
+        for form in range(FORMS):
+            x[out + form] = p[at + UNIT] * s[last + 3 + LEANS + form]
+            x[out + FORMS + form] = abs(o) * x[out + form]
 
 
 @register_basis
 class ShapedIntervalBasis(Basis):
-    """Intervals of the given widths (m) with some of the `parts` reversible, position, output.
+    """Intervals of the given widths (m) with some of the `parts` reversible, position, output, branches.
 
     `places` (odd, 3 to 25) points of the range and `groups` of intervals say how finely position and the
     reversible part are resolved. `skew` (-0.9 to 0.9) makes it stiffer in one direction, for motion beyond
     `grain` (m). `shape` (N entries, any unit) are weights near the true ones, by which the output that bends
-    itself is known. Raises ConfigError for what is outside these ranges.
+    itself is known. `smooth` (0 to 10, in halves of the range) is the length over which weights are expected
+    to be alike, 0 for each on its own. Raises ConfigError for what is outside these ranges.
     """
 
     name = "shaped-interval"
@@ -167,12 +155,13 @@ class ShapedIntervalBasis(Basis):
     def __init__(
         self,
         widths: Sequence[float] | Floats,
-        parts: Sequence[str] = PARTS,
+        parts: Sequence[str] = USUAL,
         places: int = PLACES,
         groups: int | None = None,
         skew: float = 0.0,
         grain: float = 0.0,
         shape: Sequence[float] | Floats | None = None,
+        smooth: float = 0.0,
     ) -> None:
         self.widths = IntervalBasis(widths).widths
         self.parts = checked_parts(parts)
@@ -193,7 +182,12 @@ class ShapedIntervalBasis(Basis):
             raise ConfigError(
                 f"{self.name} model: grain is {grain:g} m; allowed is 0 to the range", key=("grain",)
             )
-        self.places, self.groups = int(places), int(groups)
+        if not 0.0 <= smooth <= 10.0:
+            raise ConfigError(
+                f"{self.name} model: smooth is {smooth:g} halves of the range; allowed is 0 to 10",
+                key=("smooth",),
+            )
+        self.places, self.groups, self.smooth = int(places), int(groups), float(smooth)
         self.skew, self.grain = float(skew), float(grain)
         fall = np.exp(-_FALL * np.cumsum(self.widths) / self.widths.sum())
         self.shape = np.array(fall if shape is None else shape, dtype=np.float64).reshape(-1)
@@ -239,13 +233,22 @@ class ShapedIntervalBasis(Basis):
         return reversible, cells
 
     @property
+    def takes_shape(self) -> bool:
+        """Whether a shape of the output, taken from weights once learned, makes it better."""
+        return any(part in self.parts for part in BY_OUTPUT)
+
+    @property
+    def _of_output(self) -> int:
+        return 2 * ("output" in self.parts) + 2 * FORMS * ("branches" in self.parts)
+
+    @property
     def size(self) -> int:
         """Number of intervals and of what the parts add."""
-        return int(self.widths.size) + len(self._points) + len(self._cells) + 2 * ("output" in self.parts)
+        return int(self.widths.size) + len(self._points) + len(self._cells) + self._of_output
 
     def vector(self) -> Floats:
         """Return N, the widths, and the table of the parts (see the places above)."""
-        counts = [len(self._points), len(self._cells), "output" in self.parts]
+        counts = [len(self._points), len(self._cells), "output" in self.parts, "branches" in self.parts]
         return np.concatenate(
             [
                 [
@@ -265,11 +268,36 @@ class ShapedIntervalBasis(Basis):
 
     def initial_state(self) -> Floats:
         """Return the anhysteretic state (5): every interval half activated."""
-        return np.concatenate([np.zeros(AMOUNTS), self.widths / 2, np.zeros(3)])
+        kept = STATES if "branches" in self.parts else 0
+        return np.concatenate([np.zeros(AMOUNTS), self.widths / 2, np.zeros(3 + kept)])
 
     def scales(self) -> Floats:
         """Return half the widths, and half the mean width for each that the parts add (m)."""
         return np.append(self.widths / 2, np.full(self.size - self.widths.size, self.widths.mean() / 2))
+
+    def likeness(self) -> Floats | None:
+        """Return the correlation (size, size) of weights by their reaches and places; see `smoothness`."""
+        if not self.smooth:
+            return None
+        reaches = np.cumsum(self.widths) / 2 - self.widths / 4
+        stiffness: list[list[Term]] = [[(r, 0.0, 1.0)] for r in reaches]
+        for first, end, point, _ in self._cells:
+            middle = float(reaches[first:end].mean())
+            stiffness.append([(middle, point, 1.0), (middle, 0.0, -1.0)])
+        curve = [[(0.0, point, 1.0), (0.0, 0.0, -1.0)] for point, _ in self._points]
+        bends = [[[(0.0, 0.0, 1.0)]] for _ in range(self._of_output)]
+        found = correlation([stiffness, curve, *bends], self.smooth * self.half)
+        # In the order of the regressors: intervals, reversible, position, output.
+        n, cells = self.widths.size, len(self._cells)
+        order = np.r_[
+            0:n, n + cells : n + cells + len(curve), n : n + cells, n + cells + len(curve) : self.size
+        ]
+        return np.asarray(found[np.ix_(order, order)])
+
+    def changed(self, **settings: Any) -> ShapedIntervalBasis:
+        """Return the basis with other settings, those of the class by their names."""
+        own = {name: getattr(self, name) for name in signature(ShapedIntervalBasis).parameters}
+        return ShapedIntervalBasis(**{**own, **settings})
 
     def to_dict(self) -> dict[str, Any]:
         """Return name, widths, parts and settings."""
@@ -281,13 +309,14 @@ class ShapedIntervalBasis(Basis):
             "groups": self.groups,
             "skew": self.skew,
             "grain": self.grain,
+            "smooth": self.smooth,
         }
-        return {**entry, "shape": [float(c) for c in self.shape]} if "output" in self.parts else entry
+        return {**entry, "shape": [float(c) for c in self.shape]} if self.takes_shape else entry
 
     @classmethod
     def from_dict(cls, entry: Mapping[str, Any]) -> ShapedIntervalBasis:
         """Build from ``{widths: [...], parts: [...], ...}``; all but the widths may be left out."""
-        checked_keys(entry, cls.name, ["widths"], ["parts", "places", "groups", "skew", "grain", "shape"])
+        checked_keys(entry, cls.name, ["widths"], _SETTINGS)
         return cls(**entry)
 
 

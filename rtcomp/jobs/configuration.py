@@ -37,13 +37,14 @@ MODELS = (
 class Shape(Section):
     """The section ``identify.shape``: what the model shaped-interval adds to the interval operator."""
 
-    parts: list[Literal["reversible", "position", "output"]] = Field(
+    parts: list[Literal["reversible", "position", "output", "branches"]] = Field(
         ["reversible", "position", "output"], description="what is added"
     )
     places: int = Field(5, ge=3, le=25, description="points of the range where weights may differ, odd")
     groups: int | None = Field(None, ge=1, description="of intervals whose weights differ alike; 4")
     skew: float = Field(0.0, ge=-0.9, le=0.9, description="how much stiffer forward; ratchets, see the docs")
     grain: float = Field(0.0, ge=0, description="m, motion back and forth that a skew does not count")
+    smooth: float = Field(0.0, ge=0, le=10, description="halves of the range over which weights are alike")
 
 
 class Identify(Section):
@@ -98,6 +99,11 @@ class Identify(Section):
             raise ConfigError(f"speaks of intervals; model is {self.model!r}", key=("beyond",))
         if self.shape is not None and self.model != ShapedIntervalBasis.name:
             raise ConfigError(f"speaks of the model shaped-interval; model is {self.model!r}", key=("shape",))
+        if self.shape is not None and self.shape.smooth:
+            learner = build_learner(self.learner)
+            if not learner.knows_likeness:
+                says = f"needs a learner that keeps a covariance, rls; the learner is {learner.name}"
+                raise ConfigError(says, key=("shape", "smooth"))
         if self.learn is not None:
             _in_order(self.learn, ("learn",))
         return self

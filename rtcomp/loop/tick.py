@@ -119,11 +119,12 @@ class Tick:
         x, lead_x = np.zeros(n + 1), np.zeros(n + 1)
         x[n] = lead_x[n] = offset_scale
         moving, follow = followed(basis, learner)
+        begun = learner.initial_state(all_scales, basis.likeness())
         self.identifier = Identifier(
             basis.kernel.address, basis.vector(), basis.initial_state(), x,
-            learner.kernel.address, learner.vector(all_scales), learner.initial_state(all_scales),
+            learner.kernel.address, learner.vector(all_scales), begun,
             self.weights, sections, memory(sections), memory(sections),
-            learner.initial_state(all_scales), self.weights.copy(), all_scales,
+            begun.copy(), self.weights.copy(), all_scales,
             moving, basis.memory(settings.gate), np.zeros(CHANGE_WIDTH), follow,
         )  # fmt: skip
         self.compensator = Compensator(basis.initial_state(), lead_x, *pid, *limits)

@@ -9,7 +9,7 @@ from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.inverse import inputs_for
 from rtcomp.hysteresis.model import HysteresisModel
-from rtcomp.hysteresis.shaped import ShapedIntervalBasis
+from rtcomp.hysteresis.shaped import PARTS, ShapedIntervalBasis
 from rtcomp.hysteresis.stop import StopBasis
 
 
@@ -19,7 +19,7 @@ def motion(rows=800):
 
 
 def shaped(seed):
-    basis = ShapedIntervalBasis.over(8, 2.4, 3.0, skew=0.05)
+    basis = ShapedIntervalBasis.over(8, 2.4, 3.0, skew=0.05, parts=PARTS)
     fall = np.exp(-np.cumsum(basis.widths) / 1.2)
     added = np.random.default_rng(seed).uniform(-0.03, 0.06, basis.size - 8)
     return HysteresisModel(basis, np.append(fall, added), 0.3)

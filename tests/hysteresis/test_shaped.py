@@ -13,7 +13,8 @@ from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.basis import regressors
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.preisach import PreisachBasis
-from rtcomp.hysteresis.shaped import PARTS, ShapedIntervalBasis, as_skewed, integral
+from rtcomp.hysteresis.shaped import PARTS, ShapedIntervalBasis, integral
+from rtcomp.hysteresis.skew import as_skewed
 from rtcomp.kernels import call_basis, compiled
 
 inputs = st.lists(st.floats(-1.5, 1.5), min_size=1, max_size=40).map(lambda a: np.array([0.0, *a]))

@@ -62,11 +62,11 @@ class Learned:
         self._learn(motions)
         for _ in range(2):
             b = self.basis
-            if not isinstance(b, ShapedIntervalBasis) or "output" not in b.parts:
+            if not isinstance(b, ShapedIntervalBasis) or not b.takes_shape:
                 break
             slopes = self.weights[: b.widths.size]
             if float(slopes @ b.widths) > 0.0:
-                self.basis = ShapedIntervalBasis(b.widths, b.parts, b.places, b.groups, shape=slopes)
+                self.basis = b.changed(shape=slopes)
                 self._learn(motions)
 
     def predict(self, u: Floats, before: Floats) -> Floats:

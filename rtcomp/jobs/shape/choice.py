@@ -22,13 +22,14 @@ from rtcomp.hysteresis.basis import Basis, regressors
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.learner import Learner
 from rtcomp.hysteresis.model import HysteresisModel
-from rtcomp.hysteresis.shaped import ShapedIntervalBasis, as_skewed
+from rtcomp.hysteresis.shaped import ShapedIntervalBasis
+from rtcomp.hysteresis.skew import as_skewed
 from rtcomp.jobs.shape.placed import Placed, placed
 from rtcomp.kernels import Floats, call_learner, compiled
 
 LADDER: tuple[tuple[str, ...], ...] = (
-    (), ("output",), ("reversible",), ("reversible", "output"), ("reversible", "position"),
-    ("reversible", "position", "output"),
+    (), ("output",), ("branches",), ("output", "branches"), ("reversible",), ("reversible", "output"),
+    ("reversible", "position"), ("reversible", "position", "output"),
 )  # fmt: skip
 """Parts tried, each alone and with a skew."""
 BLOCKS = 6
@@ -37,6 +38,10 @@ ROWS_A_WEIGHT = 20
 PLACED = "intervals placed"
 LEAST_GAIN = 0.02
 """Share of its error that a larger model must take away, significant or not."""
+PAYS = 0.25
+"""Share of the symmetric operator's error that a shape must take away: beyond the motion it is less sure."""
+_ALIKE, _MUCH = 0.05, 0.25
+"""Logarithms of a ratio of errors up to which two are alike in a block, and from which one is much worse."""
 _SKEWS = np.linspace(-0.4, 0.4, 9)
 _FINEST = 2e-4
 _ROUNDS = 2
@@ -74,6 +79,11 @@ class Candidate:
     def holds(self) -> str:
         """Say how many numbers were learned."""
         return f"{self.weights} weights" + (f" and {self.places} places" if self.places else "")
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether nothing is added to the symmetric operator, wherever its intervals lie."""
+        return not self.parts and not self.skew
 
     @property
     def rms(self) -> float:
@@ -124,7 +134,7 @@ def learned_with_state(
     """Return weights (size + 1,) learned row by row, and the learner's state then."""
     scales = np.append(basis.scales(), x[0, -1])
     w = np.zeros(x.shape[1])
-    vector, state = learner.vector(scales), learner.initial_state(scales)
+    vector, state = learner.vector(scales), learner.initial_state(scales, basis.likeness())
     _learn_rows(learner.kernel.address, vector, state, x, force, rows, w)
     return w, state
 
@@ -139,27 +149,33 @@ def significantly_worse(one: Candidate, other: Candidate) -> bool:
     """Tell whether the error of `one` is above that of `other` by more than chance, and by 2 % at least.
 
     Paired over the blocks held out, by the logarithm of the error, for blocks differ in how much moves in
-    them: one-sided 95 %, or in every block (sign test).
+    them: one-sided 95 %, or in every block (sign test). Or where a block tells them apart that has a motion
+    which the others have not, as the growing first one: there it is much worse, and nowhere is it better.
     """
     worse = 0.5 * np.log(np.maximum(one.squares, 1e-300) / np.maximum(other.squares, 1e-300))
     count = worse.size
     doubt = _T.get(count, 1.8) * float(worse.std(ddof=1)) / np.sqrt(count) if count > 1 else 0.0
     always = count >= _SIGNS and bool((worse > 0.0).all())
-    return bool(worse.mean() > (LEAST_GAIN if always else max(doubt, LEAST_GAIN)))
+    nowhere_better = count > 1 and bool(worse.min() > -_ALIKE and worse.max() > _MUCH)
+    return bool(worse.mean() > (LEAST_GAIN if always or nowhere_better else max(doubt, LEAST_GAIN)))
 
 
 def smallest_that_pays(candidates: Sequence[Candidate]) -> int:
     """Return the index of the candidate with the fewest weights not significantly worse than the best.
 
-    With intervals as configured, that is; with those that were placed it is sought by itself, and taken only
-    where the other is significantly worse. All at once, many candidates more would make more of chance.
+    What is added to the symmetric operator must take away `PAYS` of its error. One with a skew, which may
+    ratchet, is taken where all that cannot are significantly worse. This with intervals as configured; with
+    those that were placed it is sought by itself, and taken only where the other is significantly worse. All
+    at once, many candidates more would make more of chance.
     """
     found = {}
     for lie in (False, True):
         own = [i for i, c in enumerate(candidates) if bool(c.places) == lie]
-        own.sort(key=lambda i: (candidates[i].weights, bool(candidates[i].skew)))
+        plain = min((candidates[i].typical for i in own if candidates[i].symmetric), default=np.inf)
+        own = [i for i in own if candidates[i].symmetric or candidates[i].typical <= (1.0 - PAYS) * plain]
+        own.sort(key=lambda i: (bool(candidates[i].skew), candidates[i].weights))
         if own:
-            best = min((candidates[i] for i in own), key=lambda c: c.rms)
+            best = min((candidates[i] for i in own), key=lambda c: c.typical)
             found[lie] = next(i for i in own if not significantly_worse(candidates[i], best))
     if len(found) == 2 and not significantly_worse(candidates[found[False]], candidates[found[True]]):
         return found[False]
@@ -279,11 +295,11 @@ def _fitted(
     grain = motion.grain if skew else 0.0
     basis = ShapedIntervalBasis(widths, parts, skew=skew, grain=grain)
     w, state = learned_with_state(basis, learner, with_offset(basis, motion.position), motion.force, rows)
-    for _ in range(_ROUNDS if "output" in parts else 0):
+    for _ in range(_ROUNDS if basis.takes_shape else 0):
         slopes = w[: widths.size]
         if not float(slopes @ widths) > 0.0:
             break
-        basis = ShapedIntervalBasis(widths, parts, skew=skew, grain=grain, shape=slopes)
+        basis = basis.changed(shape=slopes)
         w, state = learned_with_state(basis, learner, with_offset(basis, motion.position), motion.force, rows)
     return basis, w, state
 

@@ -66,19 +66,21 @@ def _supported(
     if not basis.parts or rows.size >= needed(basis.size):
         return None
 
-    def having(parts: tuple[str, ...]) -> ShapedIntervalBasis:
-        own = (basis.places, basis.groups, basis.skew, basis.grain, basis.shape)
-        return ShapedIntervalBasis(basis.widths, parts, *own)
-
     kept: tuple[str, ...] = ()
     for size in range(len(basis.parts) - 1, 0, -1):
-        fits = [p for p in combinations(basis.parts, size) if rows.size >= needed(having(p).size)]
+        fits = [
+            p for p in combinations(basis.parts, size) if rows.size >= needed(basis.changed(parts=p).size)
+        ]
         if fits:
             kept = fits[0]
             break
-    less = having(kept) if kept or basis.skew else IntervalBasis(basis.widths)
+    less = basis.changed(parts=kept) if kept or basis.skew else IntervalBasis(basis.widths)
     w, state = learned_with_state(less, learner, with_offset(less, motion.position), motion.force, rows)
-    left = [f"{part} ({needed(having((*kept, part)).size)})" for part in basis.parts if part not in kept]
+    left = [
+        f"{part} ({needed(basis.changed(parts=(*kept, part)).size)})"
+        for part in basis.parts
+        if part not in kept
+    ]
     scales = np.append(less.scales(), less.scales().mean())
     found = HysteresisModel(less, w[:-1], float(w[-1] * scales[-1]))
     return found, lambda: learner.information(state, scales), [left_off(rows.size, left)]

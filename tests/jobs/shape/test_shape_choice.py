@@ -213,6 +213,11 @@ def test_auto_places_intervals_and_keeps_what_is_known():
         ({"model": "stop", "shape": {"parts": []}}, "shaped-interval"),
         ({"model": "shaped-interval", "shape": {"parts": ["positon"]}}, "parts"),
         ({"model": "shaped-interval", "shape": {"places": 4}}, "places"),
+        ({"model": "shaped-interval", "shape": {"smooth": -0.5}}, "smooth"),
+        (
+            {"model": "shaped-interval", "shape": {"smooth": 1.0}, "learner": {"learner": "nlms"}},
+            "smooth: needs a learner that keeps a covariance, rls; the learner is nlms",
+        ),
         ({"model": "shaped-interval", "prior": "non-increasing"}, "speaks of intervals"),
         ({"model": "stop", "beyond": "continue"}, "speaks of intervals"),
     ],
