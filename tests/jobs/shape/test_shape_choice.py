@@ -41,7 +41,7 @@ def test_nothing_is_added_to_a_symmetric_truth():
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_parts_that_are_there_are_found(seed):
-    for parts in (("output",), ("reversible",), ("reversible", "position")):
+    for parts in (("output",), ("branches",), ("reversible",), ("reversible", "position")):
         truth = ShapedIntervalBasis(PLAIN.widths, parts, shape=FALL)
         added = np.random.default_rng(seed).uniform(0.4, 0.8, truth.size - 8)
         choice = choose(PLAIN, Rls(1.0), motion(truth, np.append(FALL, added), seed=seed))
@@ -86,6 +86,31 @@ def test_worse_in_every_block_is_worse_whatever_the_scatter():
     assert smallest_that_pays([plain, Candidate(("output",), 0.1, 10, base)]) == 1
     seldom = Candidate((), 0.1, 8, base * np.array([6.0, 1.2, 1.2, 0.9, 1.2, 1.2]))
     assert smallest_that_pays([seldom, Candidate(("output",), 0.1, 10, base)]) == 0
+
+
+def test_much_worse_in_one_block_and_better_in_none_is_worse():
+    """The block in which motion grows is often the only one with small loops."""
+    base = np.ones(6)
+    growing = Candidate(("branches",), 0.0, 9, base * np.array([3.0, 0.98, 1.0, 0.99, 1.01, 1.0]))
+    elsewhere = replace(growing, squares=base * np.array([3.0, 0.6, 1.0, 0.99, 1.01, 1.0]))
+    plain, both = Candidate((), 0.0, 8, 9.0 * base), Candidate(("output", "branches"), 0.0, 11, base)
+    assert smallest_that_pays([plain, growing, both]) == 2
+    assert smallest_that_pays([plain, elsewhere, both]) == 1
+
+
+def test_what_cannot_ratchet_comes_before_what_does_as_well_with_less():
+    base = np.random.default_rng(0).uniform(0.5, 2.0, 6)
+    plain, skewed = Candidate((), 0.0, 8, 9.0 * base), Candidate((), 0.1, 8, base)
+    closing = Candidate(("branches",), 0.0, 12, 1.02 * base)
+    assert smallest_that_pays([plain, skewed, closing]) == 2
+    assert smallest_that_pays([plain, skewed, replace(closing, squares=1.5 * base)]) == 1
+
+
+def test_a_shape_pays_from_a_quarter_of_the_error_on():
+    base = np.random.default_rng(0).uniform(0.5, 2.0, 6)
+    plain = Candidate((), 0.0, 8, base)
+    assert smallest_that_pays([plain, Candidate(("output",), 0.0, 10, 0.8**2 * base)]) == 0
+    assert smallest_that_pays([plain, Candidate(("output",), 0.0, 10, 0.7**2 * base)]) == 1
 
 
 def test_a_block_that_errs_much_has_no_more_say_in_the_skew_than_others():
