@@ -31,7 +31,7 @@ from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.hysteresis.rls import Rls
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
-from rtcomp.jobs.tick_settings import tick_settings
+from rtcomp.jobs.tick_settings import check_size, tick_settings
 from rtcomp.kernels import Floats
 from rtcomp.loop.clock import VirtualClock, WallClock
 from rtcomp.loop.device import Device
@@ -158,6 +158,7 @@ def make_tick(
     else:
         # Without a section identify nothing learns: a basis of one interval fills the place.
         basis = config.basis() if section is not None else IntervalBasis([1.0])
+    check_size(config, basis.size)
     learner = config.learner() if section is not None else Lms()
     offset = section.offset if section is not None else True
     controller = stage.controller
