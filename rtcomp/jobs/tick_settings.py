@@ -31,13 +31,13 @@ def check_size(config: Configuration, size: int) -> None:
     if size > MOST_WITH_RLS and section.learner.get("learner") == Rls.name:
         raise config.file.error(
             key,
-            f"{size} elements are too many for the learner rls, which keeps {size} times {size} numbers; take "
-            f"at most {MOST_WITH_RLS}, or the learner nlms",
+            f"{size} elements are too many for the learner rls, which keeps {size} times {size} numbers; "
+            f"take at most {MOST_WITH_RLS}, or the learner nlms",
         )
     if size > MOST_WITH_PRIOR and section.prior != "none":
         raise config.file.error(
             key,
-            f"{size} elements are too many for identify.prior; take at most {MOST_WITH_PRIOR}, or prior: none",
+            f"{size} elements are too many for identify.prior; take at most {MOST_WITH_PRIOR}, or prior none",
         )
 
 
