@@ -15,6 +15,8 @@ FAR = 20.0
 """Spans of the motion over the operator's range from which on hardly any of it is presliding."""
 TURNED = 0.02
 """Way back that counts as a reversal, as a share of the motion's span, or of the range where that is less."""
+NOISES = 8.0
+"""And at least so many times the sensor's rms noise (m), which turns back all the time."""
 RISES = 0.1
 """Share of the force by which it may rise where all elements have yielded: the range is too small beyond."""
 LEAST_ROWS = 50
@@ -52,7 +54,9 @@ def never_reached(model: HysteresisModel) -> list[str]:
 
 def one_way(basis: Basis, position: Floats) -> list[str]:
     """Say that the motion never turned back: one branch is all that the model rests on."""
-    back = TURNED * min(float(np.ptp(position)), range_of(basis))
+    span = float(np.ptp(position))
+    noise = float(np.median(np.abs(np.diff(position, 2)))) / (0.6745 * np.sqrt(6.0))
+    back = min(max(TURNED * min(span, range_of(basis)), NOISES * noise), 0.5 * span)
     down = float(np.max(np.maximum.accumulate(position) - position))
     up = float(np.max(position - np.minimum.accumulate(position)))
     if min(down, up) > back:
