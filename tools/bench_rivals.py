@@ -45,6 +45,7 @@ def rivals(count: int) -> list[tuple[str, Basis, Learner]]:
         ("interval + RLS", IntervalBasis.over(count, span), Rls()),
         ("interval + LMS", IntervalBasis.over(count, span), Lms()),
         ("stop + gradient", StopBasis.over(count, span), Gradient()),
+        ("stop + RLS", StopBasis.over(count, span), Rls()),
         ("extended stop + RLS", ExtendedStopBasis.over(count, span), Rls()),
         # Its plane stands still, so it must cover the motion; as many divisions as the others have elements.
         # Trust 0.1 is its best of 0.1, 1, 10, 100: with 100 it fits the noise and fails on other motion.

@@ -17,7 +17,7 @@ from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.judge import Friction, Judgement, friction_of, judge, learning_curve
 from rtcomp.jobs.known import completed
 from rtcomp.jobs.lead import NOTHING, lead_volts
-from rtcomp.jobs.motion_notes import motion_notes
+from rtcomp.jobs.motion_notes import motion_notes, still_rising
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
 from rtcomp.jobs.session import Run, Watch, check, make_device, make_tick, run_loop, stopped
 from rtcomp.jobs.shape.that_pays import that_pays
@@ -105,7 +105,8 @@ def identify(
     settle = min(settle, 0.5 * float(learned.columns["time"][-1]))
     in_sample = judge(model, own, settle=settle)
     held_out, on, number = None, own, None
-    notes = [*learned.remarks, *motion_notes(model, learned_positions(config, learned)), *shape_notes]
+    of_motion = [*motion_notes(model, learned_positions(config, learned)), *still_rising(model, own)]
+    notes = [*learned.remarks, *of_motion, *shape_notes]
     unjudged = "the model was not judged on other motion"
     if learned.outcome.stopped_by == "signal":
         number = learned.signal
@@ -264,7 +265,8 @@ def _from_recording(
         own,
         (window[0], window[1]) if window is not None else (first, last),
     )
-    notes = [*recording.notes, *motion_notes(model, recording.position[time <= learn_end]), *shape_notes]
+    of_motion = [*motion_notes(model, recording.position[time <= learn_end]), *still_rising(model, own)]
+    notes = [*recording.notes, *of_motion, *shape_notes]
     return Identified(config, model, learned, in_sample, held_out, learned.weights_time, curve, notes)
 
 

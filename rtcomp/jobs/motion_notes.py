@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from rtcomp.hysteresis.basis import Basis
+from rtcomp.hysteresis.basis import Basis, regressors
+from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.model import HysteresisModel
+from rtcomp.hysteresis.shaped import ShapedIntervalBasis
+from rtcomp.jobs.judge import Friction
 from rtcomp.kernels import Floats
 
 FAR = 20.0
 """Spans of the motion over the operator's range from which on hardly any of it is presliding."""
 TURNED = 0.02
 """Way back that counts as a reversal, as a share of the motion's span, or of the range where that is less."""
+NOISES = 8.0
+"""And at least so many times the sensor's rms noise (m), which turns back all the time."""
+RISES = 0.1
+"""Share of the force by which it may rise where all elements have yielded: the range is too small beyond."""
+LEAST_ROWS = 50
+"""Rows right behind the range, and further on, from which that is said."""
 
 
 def motion_notes(model: HysteresisModel, position: Floats) -> list[str]:
@@ -45,7 +54,9 @@ def never_reached(model: HysteresisModel) -> list[str]:
 
 def one_way(basis: Basis, position: Floats) -> list[str]:
     """Say that the motion never turned back: one branch is all that the model rests on."""
-    back = TURNED * min(float(np.ptp(position)), range_of(basis))
+    span = float(np.ptp(position))
+    noise = float(np.median(np.abs(np.diff(position, 2)))) / (0.6745 * np.sqrt(6.0))
+    back = min(max(TURNED * min(span, range_of(basis)), NOISES * noise), 0.5 * span)
     down = float(np.max(np.maximum.accumulate(position) - position))
     up = float(np.max(position - np.minimum.accumulate(position)))
     if min(down, up) > back:
@@ -75,4 +86,36 @@ def too_far(basis: Basis, position: Floats) -> list[str]:
     return [
         f"the motion spans {span:.3g}, {span / total:.3g} times identify.range ({total:.3g}): nearly all of "
         "it is sliding, from which the weights are not learned; move less, or make identify.range larger"
+    ]
+
+
+def still_rising(model: HysteresisModel, friction: Friction) -> list[str]:
+    """Say that the force measured goes on rising behind the range, where the model has all slide."""
+    basis, position = model.basis, friction.position
+    total = range_of(basis)
+    far = float(np.ptp(position)) > FAR * total  # `too_far` says it
+    if far or not isinstance(basis, IntervalBasis | ShapedIntervalBasis):
+        return []
+    # How far the motion went on in the same direction since the last interval was full.
+    z = regressors(IntervalBasis(basis.widths), position).sum(axis=1)
+    full = np.abs(z) >= (0.5 - 1e-6) * total
+    step = np.where(full, np.abs(np.diff(position, prepend=position[0])), 0.0)
+    way = np.cumsum(step)
+    behind = way - np.maximum.accumulate(np.where(full, 0.0, way))
+    force = np.sign(z) * (friction.force - model.offset)
+    counts = full & friction.good
+    early, late = counts & (behind < 0.25 * total), counts & (behind > 0.5 * total)
+    if min(np.count_nonzero(early), np.count_nonzero(late)) < LEAST_ROWS:
+        return []
+    # By the way alone, not by the speed, which on a sine goes with it.
+    speed = np.abs(np.gradient(position, friction.time))[counts]
+    columns = np.column_stack([np.ones(speed.size), behind[counts] / total, speed / max(speed.max(), 1e-300)])
+    along = float(np.linalg.lstsq(columns, force[counts], rcond=None)[0][1])
+    rises = along * float(behind[late].mean() - behind[early].mean()) / total
+    level = abs(float(force[late].mean()))
+    if not rises > RISES * level:
+        return []
+    return [
+        f"where all elements have yielded the force still rises, by {100 * rises / level:.0f} %: make "
+        f"identify.range ({total:.3g}) larger, or name in the stage what rises, such as a spring"
     ]

@@ -25,11 +25,13 @@ from rtcomp.control.pid import pid_state, pid_vector
 from rtcomp.errors import ConfigError, Interrupted
 from rtcomp.hysteresis.conditioning import low_pass
 from rtcomp.hysteresis.interval import IntervalBasis
+from rtcomp.hysteresis.learner import Learner
 from rtcomp.hysteresis.lms import Lms
 from rtcomp.hysteresis.model import HysteresisModel
+from rtcomp.hysteresis.rls import Rls
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
-from rtcomp.jobs.tick_settings import tick_settings
+from rtcomp.jobs.tick_settings import check_size, tick_settings
 from rtcomp.kernels import Floats
 from rtcomp.loop.clock import VirtualClock, WallClock
 from rtcomp.loop.device import Device
@@ -45,6 +47,8 @@ RING_SECONDS = 8.0
 """How long the recorder may be held up before rows are lost."""
 LEAST_TICKS = 64
 """Rows from which an interrupted run can be judged."""
+GIVEN_TRUST = 3.0
+"""Trust (see `Rls`) in which a learner begins that was given a model: it may be wrong, it is not nothing."""
 WEIGHTS_EVERY = 0.1
 """s between two stored sets of weights."""
 
@@ -154,6 +158,7 @@ def make_tick(
     else:
         # Without a section identify nothing learns: a basis of one interval fills the place.
         basis = config.basis() if section is not None else IntervalBasis([1.0])
+    check_size(config, basis.size)
     learner = config.learner() if section is not None else Lms()
     offset = section.offset if section is not None else True
     controller = stage.controller
@@ -176,8 +181,20 @@ def make_tick(
     )
     if model is not None:
         offset_weight = model.offset / tick.offset_scale if tick.offset_scale else 0.0
-        tick.adopt_weights(np.append(model.weights, offset_weight))
+        tick.adopt_weights(np.append(model.weights, offset_weight), _knowing(learner, tick))
     return tick
+
+
+def _knowing(learner: Learner, tick: Tick) -> Floats | None:
+    """Return the state of a learner that was given a model, or None where it keeps nothing of what it knows.
+
+    One that takes the weights for nothing makes them jump with its first updates, and the feedforward with
+    them: learning on would cost more than it mends.
+    """
+    if not isinstance(learner, Rls) or learner.trust <= GIVEN_TRUST:
+        return None
+    less = Rls(learner.forgetting, GIVEN_TRUST, learner.drift)
+    return less.initial_state(tick.scales, tick.basis.likeness())
 
 
 def run_loop(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from rtcomp.hysteresis.rls import Rls
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.limit_settings import STUCK_S, contradictions, flicker
 from rtcomp.loop.tick import TickSettings
@@ -16,6 +17,28 @@ SLOTS_LOST = 20
 """Slots lost after which a loop stops, unless told."""
 MOST_FORCE = 10.0
 """Times what the drive can give at most: a model that says more has diverged."""
+
+MOST_WITH_RLS, MOST_WITH_PRIOR = 5000, 1000
+"""Elements: RLS keeps a square of them, 0.2 GB at the most; the prior's least squares take their cube."""
+
+
+def check_size(config: Configuration, size: int) -> None:
+    """Raise ConfigError where so many elements would take more memory or time than anybody has."""
+    section = config.run.identify
+    if section is None:
+        return
+    key = ("identify", "intervals" if section.widths is None else "widths")
+    if size > MOST_WITH_RLS and section.learner.get("learner") == Rls.name:
+        raise config.file.error(
+            key,
+            f"{size} elements are too many for the learner rls, which keeps {size} times {size} numbers; "
+            f"take at most {MOST_WITH_RLS}, or the learner nlms",
+        )
+    if size > MOST_WITH_PRIOR and section.prior != "none":
+        raise config.file.error(
+            key,
+            f"{size} elements are too many for identify.prior; take at most {MOST_WITH_PRIOR}, or prior none",
+        )
 
 
 def tick_settings(config: Configuration, delay_ticks: int, closed_loop: bool) -> TickSettings:

@@ -178,7 +178,13 @@ class Tick:
         """How often the weights were changed."""
         return int(self.state[at.UPDATES])
 
-    def adopt_weights(self, weights: Floats) -> None:
-        """Take weights (size of basis + 1) as the start, to which a diverged identifier goes back."""
+    def adopt_weights(self, weights: Floats, memory: Floats | None = None) -> None:
+        """Take weights (size of basis + 1) as the start, to which a diverged identifier goes back.
+
+        `memory` is the state of a learner that holds them for known; as one that knows nothing if not given.
+        """
         self.weights[:] = weights
         self.identifier.w_kept[:] = weights
+        if memory is not None:
+            self.identifier.ls[:] = memory
+            self.identifier.ls_kept[:] = memory

@@ -104,6 +104,19 @@ def test_learning_on_while_compensating_mends_a_bad_model(leuven, identified):
     assert np.abs(with_it.model.weights - bad.weights).max() > 1e3
 
 
+@pytest.mark.parametrize("times", [1.0, 2.0], ids=["good", "twice too strong"])
+def test_learning_on_begins_with_what_it_was_given(leuven, identified, times):
+    """A learner that took a given model for nothing made the feedforward jump, and the peak twice as high."""
+    given = HysteresisModel(identified.model.basis, times * identified.model.weights, identified.model.offset)
+    frozen = compensate(leuven, identified.model)
+    learning = compensate(leuven.changed(compensate={**leuven.file.data["compensate"], "learn": True}), given)
+    assert learning.error_with.rms < frozen.error_with.rms
+    assert learning.error_with.peak < frozen.error_with.peak
+    steps = [np.abs(np.diff(run.with_it.columns["feedforward"])).max() for run in (frozen, learning)]
+    assert steps[1] < 1.5 * steps[0]
+    assert learning.with_it.outcome.taken_back == 0
+
+
 def test_live_the_error_falls_when_the_feedforward_comes(leuven):
     run = live(leuven, 5.0, 0.5)
     time, error = run.tracking_error()

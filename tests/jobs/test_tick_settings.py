@@ -8,7 +8,7 @@ import pytest
 
 from rtcomp.errors import ConfigError
 from rtcomp.jobs.configuration import RunFile
-from rtcomp.jobs.tick_settings import tick_settings
+from rtcomp.jobs.tick_settings import MOST_WITH_PRIOR, MOST_WITH_RLS, check_size, tick_settings
 from rtcomp.stage.schema import RUN_SECTIONS, StageFile
 
 
@@ -78,3 +78,24 @@ def test_a_recording_is_learned_from_whatever_its_rate_makes_of_the_limits(leuve
     assert tick_settings(slow, 0, False).age_ticks == math.inf
     # An age that nobody gave is no contradiction.
     assert tick_settings(leuven.changed(rate=5.0, limits={}), 0, True).age_ticks == 1
+
+
+@pytest.mark.parametrize(
+    ("section", "size", "says"),
+    [
+        ({}, MOST_WITH_PRIOR, ""),
+        ({}, MOST_WITH_PRIOR + 1, r"identify.intervals: 1001 elements are too many for identify.prior; take"),
+        ({"prior": "none"}, MOST_WITH_RLS, ""),
+        ({"prior": "none"}, MOST_WITH_RLS + 1, r"5001 elements are too many for the learner rls, which"),
+        ({"prior": "none", "learner": {"learner": "nlms"}}, 100_000, ""),
+    ],
+)
+def test_more_elements_than_memory_or_time_allow_are_refused_before_anything_is_allocated(
+    leuven, section, size, says
+):
+    config = leuven.changed(identify={**leuven.file.data["identify"], **section})
+    if says:
+        with pytest.raises(ConfigError, match=says):
+            check_size(config, size)
+    else:
+        check_size(config, size)

@@ -27,7 +27,8 @@ def test_rivals_are_compared_and_the_intervals_are_better_conditioned(tmp_path):
     assert done.returncode == 0, done.stderr
     figures = {f["name"]: f for f in json.loads(target.read_text())["rivals"]}
     assert set(figures) == {
-        "interval + RLS", "interval + LMS", "stop + gradient", "extended stop + RLS", "Preisach + RLS",
+        "interval + RLS", "interval + LMS", "stop + gradient", "stop + RLS", "extended stop + RLS",
+        "Preisach + RLS",
     }  # fmt: skip
     assert figures["interval + RLS"]["held_out_percent"] < 1.0
     assert figures["stop + gradient"]["condition_number"] > 50 * figures["interval + RLS"]["condition_number"]
