@@ -115,13 +115,22 @@ def _quickly(current: Fitted, motion: Motion, entries: list[Entry], screened: Sc
     for variant in [*_variants(screened.entry, current.ledger.stage), *screened.forms]:
         try:
             made = [*entries, variant]
-            found.append(refine(current, motion, made, which=[len(entries)], tries=QUICK))
+            tried = refine(current, motion, made, which=[len(entries)], tries=QUICK)
         except (ConfigError, np.linalg.LinAlgError):
             continue
+        if not _below_a_count(tried.entries[-1], current.ledger.stage):
+            found.append(tried)
     found.sort(key=lambda r: float(r.errors.sum()) * _handicap(r.entries[-1]))
     kind = UNDECIDED.get(screened.name)
     others = [r for r in found if kind and r.entries[-1].get(kind) != found[0].entries[-1].get(kind)]
     return [*found[:1], *others[:1]]
+
+
+def _below_a_count(entry: Entry, stage: Stage) -> bool:
+    """Tell whether an entry is a jump of less than a count of the sensor: what is lost are whole counts."""
+    if entry["name"] != "sensor-jump":
+        return False
+    return abs(float(entry["size"])) < stage.sensor.resolution  # type: ignore[arg-type]
 
 
 def _handicap(entry: Entry) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rtcomp.diagnosis.base import Fitted
+from rtcomp.diagnosis.base import BELIEVED, Fitted
 from rtcomp.diagnosis.departure import departure
 from rtcomp.diagnosis.refine import Refined
 from rtcomp.kernels import Floats
@@ -15,6 +15,8 @@ APART = 1.6
 """Factor on the error with the best name, beyond which another name is told apart from it."""
 FURTHER = 3.0
 """How much further (see `departure`) a name may take the believed numbers than the best one."""
+NO_FURTHER = 1.0
+"""How much further one number of another value may take the others than what scales all of them a little."""
 ALIKE = 0.06
 """Names are not told apart where they differ by less than this part of what the best explains."""
 PLAINER = {"asymmetric-viscous-friction": "viscous-friction"}
@@ -28,6 +30,10 @@ ONE_THING = (
     ("viscous-friction", "back-emf"),
 )
 """Entries that are the same force on any recording of this kind: only what is tried is listed first."""
+SCALES_ALL = {"drive-gain": "gain", "sensor-scale": "scale"}
+"""Entries that scale all believed numbers together, and the parameter that says by how much."""
+ONE_NUMBER = ("inertia", "viscous-friction")
+"""Entries that only give one believed number another value."""
 
 
 def last(refined: Refined) -> str:
@@ -59,9 +65,20 @@ def least_far(tried: Sequence[Refined], current: Fitted) -> Refined:
         if float(other.errors.sum()) > APART * float(tried[0].errors.sum()):
             continue
         away = departure(other.fitted)
-        if away < nearest - FURTHER:
+        if away < nearest - FURTHER or (_scales_little(best) and _one_number(other, nearest)):
             best, nearest = other, away
     return best
+
+
+def _scales_little(refined: Refined) -> bool:
+    """Tell whether the last entry scales all numbers by no more than each of them may be off anyway."""
+    size = SCALES_ALL.get(last(refined))
+    return size is not None and abs(float(refined.entries[-1][size]) - 1.0) < BELIEVED  # type: ignore[arg-type]
+
+
+def _one_number(refined: Refined, nearest: float) -> bool:
+    """Tell whether the last entry is another value of one number, which leaves the others as believed."""
+    return last(refined) in ONE_NUMBER and departure(refined.fitted) < nearest + NO_FURTHER
 
 
 def alike(best: Refined, rest: Sequence[Refined], current: Fitted, floor: Floats) -> tuple[list[str], float]:

@@ -31,6 +31,8 @@ AMENDS = 0.15
 """unless all harm together is less than this part of what it gains: two effects may hide in each other."""
 ABOVE_FLOOR = 1.6
 """Squared error over the floor's, below which nothing is missing."""
+NEAR = 2.5
+"""Squared error over the floor's, below which a free curve must stand out: it fits rounding as well."""
 SETTLED = 0.004
 """Part of the first excess over the floor, below which what is left is how the kernels model, not physics."""
 BESIDE, MORE = 0.15, 0.3
@@ -45,6 +47,9 @@ ALL = 0.85
 NOISE, STEADILY = 0.7, 0.4
 """Times the floor that an entry must gain to be worth naming: in general, and where nearly all blocks gain
 and it explains most of what is left."""
+DISTINCT, DOUBTLESS, MOST_BLOCKS = 0.2, 3.0, 0.75
+"""Part of the error that an entry must explain where the level of it says nothing, standard errors of the
+logarithm of what it leaves of a block, and the part of the blocks that must gain."""
 SURE = 8.0
 """Standard errors of what it gains, in nearly all blocks, from which on it counts beside others as well."""
 RIVAL, HALF = 0.7, 0.3
@@ -79,6 +84,8 @@ class Decision:
     base: Fitted
     first_look: list[Screened] = field(default_factory=list)
     first_refined: dict[str, float] = field(default_factory=dict)
+    faint: bool = False
+    """Whether the level of the error alone does not show that something is missing."""
 
     def left(self, floor: Floats) -> float:
         """Return the part of the excess over `floor` that the names leave, of the motion that was seen."""
@@ -106,8 +113,8 @@ def decide(
 ) -> Decision:
     """Name what is missing; `floor` is the squared error of every seen block if nothing were.
 
-    Names in `without` are not considered. With `looked_at` there is something to be explained whatever the
-    floor says.
+    Names in `without` are not considered. With `looked_at` it is looked for whatever the floor says: an
+    entry may stand out of a level that does not.
     """
     entries: list[Entry] = []
     choices: list[Choice] = []
@@ -137,7 +144,15 @@ def decide(
             added, ahead = _look_ahead(stage, motion, current, added, floor, part_of(step), without)
         best = added.best
         together = step == 0 and best is not greedy
-        if best is None or not (together or _worth_it(current.errors, best.errors, floor)):
+        if best is None:
+            break
+        near = step == 0 and current.errors.sum() < NEAR * floor.sum()
+        shapeless = last(best) in SHAPELESS
+        if not together and not _worth_it(current.errors, best.errors, floor):
+            if step > 0 or shapeless or not _stands_out(current.errors, best.errors):
+                break
+            decision.faint = True
+        elif near and shapeless and not _stands_out(current.errors, best.errors):
             break
         if entries and not _settles_the_rest(base.errors, current.errors, best.errors, floor):
             break
@@ -176,6 +191,22 @@ def _worth_it(before: Floats, after: Floats, floor: Floats) -> bool:
         and (broad or plain)
         and float(gained.sum()) > 0.05 * excess
         and float(gained.sum()) > (STEADILY if throughout else NOISE) * float(floor.sum())
+    )
+
+
+def _stands_out(before: Floats, after: Floats) -> bool:
+    """Tell whether the step from `before` to `after` is no accident, wherever their level is.
+
+    A floor is only as good as the double that it comes from, and a level above it adds up all that is wrong
+    in small. What has the shape of an entry is gone from nearly every block that was left out.
+    """
+    gained = before - after
+    ratio = np.log(np.maximum(before, 1e-300) / np.maximum(after, 1e-300))
+    doubt = float(ratio.std(ddof=1) / np.sqrt(ratio.size))
+    return (
+        float(gained.sum()) > DISTINCT * float(before.sum())
+        and float(ratio.mean()) > DOUBTLESS * doubt
+        and float(np.mean(gained > 0.05 * before)) >= MOST_BLOCKS
     )
 
 

@@ -15,7 +15,7 @@ from rtcomp.diagnosis.certain import birge, intervals, neighbours, retunings
 from rtcomp.diagnosis.curves import curves, left_over
 from rtcomp.diagnosis.decide import ABOVE_FLOOR, Choice, Decision
 from rtcomp.diagnosis.experiment import next_experiment
-from rtcomp.diagnosis.explain import AGREES, explain
+from rtcomp.diagnosis.explain import AGREES, NEGLIGIBLE, explain
 from rtcomp.diagnosis.extend import extended_stage
 from rtcomp.diagnosis.floor import floor_errors
 from rtcomp.diagnosis.locate import locate
@@ -41,8 +41,6 @@ from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
 from rtcomp.units import for_axis
 
-NEGLIGIBLE = 0.0035
-"""Relative force error up to which nothing is looked for."""
 OPEN = 4.0
 """Squared error over the floor's, from which on something remains that no entry explains."""
 LOUD = 0.03

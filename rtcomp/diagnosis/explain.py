@@ -21,6 +21,8 @@ from rtcomp.kernels import Floats
 from rtcomp.stage.balance import force_balance
 from rtcomp.stage.stage import Stage
 
+NEGLIGIBLE = 0.0035
+"""Relative force error up to which nothing is looked for."""
 CLEAR = 0.5
 """Part of the mismatch that depends on one axis, from which on it is looked into however small it is."""
 STRUCTURED = 0.3
@@ -31,6 +33,8 @@ again, beyond which names are taken back."""
 LEAST, MUCH, OPEN = 0.35, 0.7, 0.2
 """Part of the held-out squared error above the floor that names with a shape of their own must explain: in
 general, and where they leave more than the part OPEN of the mismatch that was seen."""
+CONFIRMED = 0.92
+"""Factor to which a name must bring the held-out error where the level of the error shows nothing."""
 AGREES = 0.006
 """Relative force error up to which a recording is held to agree, whatever its noise promises."""
 FAR, NEARLY_ALL = 4.0, 0.97
@@ -67,12 +71,15 @@ def explain(
     power = float(base.system.blocks.power[base.ledger.seen].sum())
     rest = float(np.sqrt(floor.sum() / power))
     # A floor is an expectation: where most of what is left hangs on one thing, it is no noise.
-    small = base.errors.sum() < ABOVE_FLOOR * least.sum()
+    small = bool(base.errors.sum() < ABOVE_FLOOR * least.sum())
     clear = small and any(p.share > CLEAR for p in locate(motion, base.residual, None, seed))
+    # And where it does not, an entry may still stand out: but that must be seen where nothing was fitted.
+    faint = small and not clear
+    looked_at = clear or bool(base.errors.sum() > NEGLIGIBLE**2 * power)
     without: frozenset[str] = frozenset()
     looks = []
     for _ in range(AGAIN + 1):
-        decision = decide(stage, motion, base, least, say, without, clear)
+        decision = decide(stage, motion, base, least, say, without, looked_at)
         looks.append((decision.first_look, decision.first_refined))
         decision.first_look, decision.first_refined = looks[0]
         decision.refined = consistent(decision.refined)
@@ -92,6 +99,7 @@ def explain(
         least_part = MUCH if decision.left(floor) > OPEN else LEAST
         strays = shaped and departure(final) > 1.5 * departure(base) + STRAYED
         little = shaped and (_explains_little(fit, least_part) or (len(named) == 1 and _leaves_much(fit)))
+        little = little or ((faint or decision.faint) and fit.after > CONFIRMED * fit.retuned)
         once = any(e["name"] == "sensor-jump" for e in named)
         if not named or (_holds(fit, once) and not strays and not little):
             return Explanation(decision, named, entries, own, final, fit)

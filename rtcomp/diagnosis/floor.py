@@ -15,7 +15,7 @@ import numpy as np
 from rtcomp.diagnosis.base import Fitted, bounds_of
 from rtcomp.diagnosis.blocks import Blocks
 from rtcomp.diagnosis.ledger import Ledger
-from rtcomp.diagnosis.motion import Motion, Strip, unstepped
+from rtcomp.diagnosis.motion import Motion, Strip, averaged, unstepped
 from rtcomp.errors import RtcompError
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.simulate import on_reference
@@ -78,23 +78,35 @@ def _shaken(fitted: Fitted, motion: Motion, seed: int) -> np.ndarray:
 
 
 def _twin(stage: Stage, motion: Motion, seed: int) -> Motion | None:
-    """Simulate `stage` along the recorded references; None where there is no reference or controller."""
+    """Simulate `stage` along the recorded references; None where there is no reference or controller.
+
+    At the rate of the recording, and averaged as it was: noise that is averaged is less, and a controller
+    that reads every fifth row moves the axis otherwise.
+    """
     if stage.controller is None or any(s.reference is None for s in motion.strips):
         return None
+    times = motion.averaged
+    rate = motion.rate * times
     strips: list[Strip] = []
     for strip in motion.strips:
         assert strip.reference is not None
-        data = {**stage.to_dict(), "rate": motion.rate, "seed": seed}
+        rows = strip.reference.size * times
+        middle = np.arange(strip.reference.size) * times + 0.5 * (times - 1)
+        reference = np.interp(np.arange(rows), middle, strip.reference)
+        data = {**stage.to_dict(), "rate": rate, "seed": seed}
         try:
             config = Configuration.of(YamlFile(data, Path("stage")))
-            run = on_reference(config, strip.reference, float(strip.position[0]))
+            run = on_reference(config, reference, float(strip.position[0]))
         except RtcompError:
             return None
-        position = run.columns["position"]
-        off = float(np.sqrt(np.mean((position - strip.position) ** 2)))
-        if run.outcome.ticks < strip.time.size or not off < 0.5 * np.ptp(strip.position):
+        if run.outcome.ticks < rows:
             return None
+        position = run.columns["position"]
         if motion.smoothed:
-            position = unstepped(position, motion.smoothed, motion.rate)
-        strips.append(replace(strip, position=position, voltage=run.columns["voltage"]))
+            position = unstepped(position, motion.smoothed, rate)
+        found = averaged(Strip(np.arange(rows) / rate, position, run.columns["voltage"], reference), times)
+        off = float(np.sqrt(np.mean((found.position - strip.position) ** 2)))
+        if not off < 0.5 * np.ptp(strip.position):
+            return None
+        strips.append(replace(strip, position=found.position, voltage=found.voltage))
     return replace(motion, strips=strips)

@@ -28,7 +28,7 @@ def timing_rows(*runs: Run) -> list[Row]:
         rows.append(Row("Scheduling", runs[-1].realtime.get("scheduling_class", "unknown")))
     if degraded := sum(r.outcome.degraded for r in runs):
         ticks_off = sum(int(np.count_nonzero(r.columns["state"] == State.DEGRADED)) for r in runs)
-        note = f"{ticks_off:,} ticks without feedforward: deadlines missed, or identifier put aside"
+        note = f"{ticks_off:,} ticks by feedback alone: deadlines missed, or identifier put aside"
         rows.append(Row("Degraded", f"{degraded:,} times", "", note))
     if diverged := sum(r.outcome.diverged for r in runs):
         rows.append(Row("Identifier put aside", f"{diverged:,} times", "", "it had diverged"))

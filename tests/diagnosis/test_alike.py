@@ -9,6 +9,7 @@ import pytest
 from recorded import run
 from recorded import stage as axis
 
+from rtcomp.diagnosis.alike import last, least_far
 from rtcomp.diagnosis.base import fit_base
 from rtcomp.diagnosis.certain import birge, intervals, neighbours
 from rtcomp.diagnosis.departure import USUAL, departure, off
@@ -65,6 +66,23 @@ def test_scaled_numbers_are_told_apart_by_what_they_leave_as_believed(
         assert not found.effects
     else:
         assert [e.names for e in found.effects] == [(name,)]
+
+
+@pytest.mark.parametrize(("gain", "preferred"), [(0.95, "inertia"), (0.7, "drive-gain")])
+def test_one_number_of_another_value_comes_before_a_little_more_of_everything(
+    gain: float, preferred: str
+) -> None:
+    believed = axis()
+    motion = prepare(believed, [run(axis(mass=2.0 * 1.05), reference())])
+    base = fit_base(believed, motion)
+    scaled = refine(base, motion, [{"name": "drive-gain", "gain": gain}], tries=0)
+    heavier = refine(base, motion, [{"name": "inertia", "mass": 2.1}], tries=0)
+    as_good = replace(heavier.fitted, errors=0.05 * base.errors)
+    tried = [
+        replace(scaled, fitted=replace(as_good, errors=0.05 * base.errors)),
+        replace(heavier, fitted=replace(as_good, errors=0.051 * base.errors)),
+    ]
+    assert last(least_far(tried, base)) == preferred
 
 
 def test_intervals_grow_with_what_is_left_and_with_what_the_grid_decides() -> None:

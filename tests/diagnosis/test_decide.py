@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtcomp.diagnosis.decide import _most_left, _settles_the_rest, _worth_it
+from rtcomp.diagnosis.decide import _most_left, _settles_the_rest, _stands_out, _worth_it
 from rtcomp.diagnosis.explain import LEAST, MUCH, _explains_little, _holds, _leaves_much
 from rtcomp.diagnosis.result import Fit
 from rtcomp.kernels import Floats
@@ -35,6 +35,25 @@ def test_a_further_name_counts_by_what_it_explains_of_the_rest(
     first, floor = even(100.0), even(0.01)
     left = even(before) * noisy
     assert _settles_the_rest(first, left, left * after / before, floor) is counts
+
+
+@pytest.mark.parametrize(
+    ("part", "blocks", "stands_out"),
+    [
+        (0.3, BLOCKS, True),  # gone from every block
+        (0.3, 17, True),
+        (0.1, BLOCKS, False),  # no more than what another kernel would trim
+        (0.6, 8, False),  # gone from some: that may be an accident of theirs
+    ],
+)
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e3])
+def test_an_entry_stands_out_by_what_is_gone_from_the_blocks_not_by_their_level(
+    part: float, blocks: int, stands_out: bool, unit: float
+) -> None:
+    quiet_and_loud = unit * np.geomspace(1.0, 50.0, BLOCKS)
+    chance = np.random.default_rng(7).uniform(0.98, 1.02, BLOCKS)
+    after = quiet_and_loud * np.where(np.arange(BLOCKS) >= BLOCKS - blocks, 1.0 - part, 1.0) * chance
+    assert _stands_out(quiet_and_loud, after) is stands_out
 
 
 def test_names_that_leave_much_must_explain_most_of_what_was_put_aside() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from recorded import run, stage, there_and_back
 
+from rtcomp.diagnosis.addition import _below_a_count
 from rtcomp.diagnosis.base import fit_base
 from rtcomp.diagnosis.certain import intervals
 from rtcomp.diagnosis.diagnose import diagnose
@@ -53,6 +54,13 @@ def test_a_small_effect_is_looked_for_at_its_size(
     assert looked.gain(at.fitted.errors) > 0.1
     ((parameter, truth),) = size.items()
     assert looked.entry[parameter] == pytest.approx(truth, rel=0.5)
+
+
+@pytest.mark.parametrize(("counts", "is_none"), [(0.5, True), (-0.5, True), (1.5, False), (-40.0, False)])
+def test_a_jump_is_of_whole_counts(counts: float, is_none: bool) -> None:
+    count = stage().sensor.resolution
+    assert _below_a_count({"name": "sensor-jump", "size": counts * count, "time": 1.0}, stage()) is is_none
+    assert not _below_a_count({"name": "sensor-drift", "drift": 0.5 * count, "time_constant": 1.0}, stage())
 
 
 def test_an_interval_ends_where_its_parameter_does() -> None:

@@ -338,6 +338,6 @@ def _best_skew(
     while step > _FINEST:
         step /= 2.0
         for other in (at - step, at + step):
-            if (found := square(other)) < least:
+            if abs(other) <= _SKEWS[-1] and (found := square(other)) < least:
                 at, least = other, found
     return round(float(at), 4) if least < (1.0 - LEAST_GAIN) ** 2 * square(0.0) else 0.0
