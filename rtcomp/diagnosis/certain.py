@@ -1,7 +1,7 @@
 """How certain the numbers of a fit are: by scatter over blocks, by the grid of reaches, by how models model.
 
-A residual that is alike for long does not count as many samples: whole blocks of
-the recording are left out in turn, and neighbouring blocks are taken to be alike. What the grid of reaches decides is seen on grids
+A residual that is alike for long does not count as many samples: whole blocks of the recording are left out
+in turn, and neighbouring blocks are taken to be alike. What the grid of reaches decides is seen on grids
 beside it that fit nearly as well.
 """
 
@@ -176,17 +176,20 @@ def retunings(
     own = level_and_reach(friction.elements) if isinstance(friction, MaxwellSlip) else (0.0, 0.0)
     before = np.array([m.mass, m.viscous, m.micro_damping, *own])
     half = worse * np.sqrt(WIDE**2 * np.maximum(spread, 0.0) + grid**2 + (MODEL * values) ** 2)
+    # What is held at its bound is so by the belief, not by the recording: its interval reaches back to it.
+    held = np.zeros(values.size)
     for i in range(FIXED):
         if before[i] > 0 and abs(abs(values[i] / before[i] - 1.0) / BELIEVED - 1.0) < 0.05:
-            half[i] = max(half[i], BELIEVED * before[i])  # held there by the belief, not by the recording
+            held[i] = BELIEVED * before[i]
     names = ("mass", "viscous", "micro_damping", "friction.level", "friction.reach")
     units = ("kg", "N s/m", "N s/m", "N", "m")
     moved = np.abs(values - before)
-    clear = np.where((before > 0) & (moved > MOVED * before), moved / np.maximum(half, 1e-300), 0.0)
+    tell = (before > 0) & (moved > MOVED * before) & (moved > held * (1.0 - 1e-6))
+    clear = np.where(tell, moved / np.maximum(half, 1e-300), 0.0)
     wider = widening(clear, int(np.count_nonzero(before > 0)))
     found = []
     for i in np.flatnonzero(clear > wider).tolist():
-        new, size = float(values[i]), wider * float(half[i])
+        new, size = float(values[i]), float(max(wider * half[i], held[i]))
         value = Value(new, max(new - size, 0.0), new + size, for_axis(units[i], believed.axis))
         found.append(Retuned(names[i], float(before[i]), value))
     return found
