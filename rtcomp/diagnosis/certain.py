@@ -1,7 +1,7 @@
 """How certain the numbers of a fit are: by scatter over blocks, by the grid of reaches, by how models model.
 
-A residual that is alike for long does not count as many samples: scores are summed over blocks of the
-recording, and neighbouring blocks are taken to be alike. What the grid of reaches decides is seen on grids
+A residual that is alike for long does not count as many samples: whole blocks of the recording are left out
+in turn, and neighbouring blocks are taken to be alike. What the grid of reaches decides is seen on grids
 beside it that fit nearly as well.
 """
 
@@ -11,8 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rtcomp.diagnosis.base import BELIEVED, Fitted, fit_base
+from rtcomp.diagnosis.base import BELIEVED, FIXED, Fitted, fit_base
+from rtcomp.diagnosis.blocks import Blocks
 from rtcomp.diagnosis.candidates import effect_of
+from rtcomp.diagnosis.departure import USUAL
 from rtcomp.diagnosis.extend import level_and_reach
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Knob, Refined, refine
@@ -29,8 +31,8 @@ BESIDE = (0.85, 1.18)
 """Factors on the reaches of the grids that a fit is held against."""
 MOVED = 0.02
 """Relative change of a parameter that is worth reporting."""
-WIDE = 2.26
-"""Standard deviations of a 95 % interval from about ten blocks (Student)."""
+FREEDOM, WIDE = 9, 2.262
+"""Degrees of freedom of about ten blocks, and standard deviations of a 95 % interval from them (Student)."""
 
 
 def neighbours(stage: Stage, motion: Motion, refined: Refined) -> list[Refined]:
@@ -57,6 +59,53 @@ def _weight(best: Fitted, other: Fitted) -> float:
     return min(float(best.errors.sum()) / max(float(other.errors.sum()), 1e-300), 1.0)
 
 
+def covariance(refined: Refined) -> Floats:
+    """Return the covariance (q, q) of the knobs, in squares of their steps.
+
+    Each block of the recording is left out in turn, the numbers of the base fitted anew beside the knobs
+    (delete-a-group jackknife: Bell and McCaffrey 2002, Survey Methodology 28(2)). Residuals that a fit has
+    bent to itself would promise too much: a score of columns takes a good part of twenty blocks up.
+    """
+    fitted, j = refined.fitted, refined.jacobian
+    ledger, c, bounds = fitted.ledger, fitted.coefficients, fitted.bounds
+    rows = ledger.seen[ledger.block]
+    slack = 1e-6 * np.abs(c)
+    free = (c > bounds.low + slack) & (c < bounds.high - slack)
+    block = np.unique(ledger.block[rows], return_inverse=True)[1]
+    count = int(block[-1]) + 1
+    table = np.column_stack([j, fitted.system.columns[rows][:, free]])
+    blocks = Blocks.of(table, -refined.residual, block, count)
+    every = np.ones(count, dtype=np.bool_)
+    without = []
+    for k in range(count):
+        others = every.copy()
+        others[k] = False
+        without.append(blocks.coefficients(others)[: j.shape[1]])
+    # What is believed of the base's numbers is as good as a measurement of them.
+    return _inverse(_inverse(scatter(np.array(without))) + refined.away.T @ refined.away)
+
+
+def _inverse(matrix: Floats) -> Floats:
+    """Return the inverse of a covariance or information (q, q) whose sizes may differ by any factor.
+
+    What is 0 stays 0: a knob that changes nothing is told nothing of.
+    """
+    size = np.sqrt(np.diag(matrix))
+    scale = np.where(size > 0.0, size, 1.0)
+    return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-10) / np.outer(scale, scale))
+
+
+def scatter(without: Floats) -> Floats:
+    """Return the jackknife's covariance (q, q) of numbers found without each block in turn, (blocks, q).
+
+    Neighbouring blocks are taken to be alike (Newey and West 1987, Econometrica 55(3), with one lag).
+    """
+    count = without.shape[0]
+    apart = without - without.mean(axis=0)
+    mixed = apart[1:].T @ apart[:-1]
+    return np.asarray((apart.T @ apart + 0.5 * (mixed + mixed.T)) * (count - 1) / count)
+
+
 def intervals(
     refined: Refined, beside: Sequence[Refined], worse: float = 1.0
 ) -> dict[tuple[int, str], tuple[float, float]]:
@@ -69,17 +118,8 @@ def intervals(
     found = {(i, "time"): (t - row, t + row) for i, t in times}
     if not refined.knobs:
         return found
-    block = ledger.block[ledger.seen[ledger.block]]
-    j, r = refined.jacobian, refined.residual
-    gram = j.T @ j
-    scores = np.array([j[block == b].T @ r[block == b] for b in np.unique(block)])
-    count = scores.shape[0]
-    # Newey and West (1987), Econometrica 55(3), with one lag.
-    mixed = scores[1:].T @ scores[:-1]
-    meat = (scores.T @ scores + 0.5 * (mixed + mixed.T)) * count / max(count - 1, 1)
-    told = gram @ np.linalg.pinv(meat, rcond=1e-12) @ gram
-    spread = np.linalg.pinv(told + refined.away.T @ refined.away, rcond=1e-12)
-    factor = float(student.ppf(0.975, max(count - 1, 1)))
+    spread = covariance(refined)
+    factor = float(student.ppf(0.975, max(int(ledger.seen.sum()) - 1, 1)))
     for k, knob in enumerate(refined.knobs):
         value = _value(refined, knob)
         sd = float(np.sqrt(max(spread[k, k], 0.0)))
@@ -105,40 +145,81 @@ def _apart(knob: Knob, one: float, other: float) -> float:
 
 
 def retunings(
-    believed: Stage, final: Fitted, beside: Sequence[Refined], extended: Stage, worse: float = 1.0
+    believed: Stage, refined: Refined, beside: Sequence[Refined], extended: Stage, worse: float = 1.0
 ) -> list[Retuned]:
-    """Return the believed parameters that the fit moved, with their 95 % intervals."""
+    """Return the believed parameters that the fit moved, with their 95 % intervals.
+
+    Numbers are told because they moved: of so chosen ones, plain intervals miss more than a twentieth.
+    Theirs are wider by how few were chosen (Benjamini and Yekutieli 2005, J. American Statistical
+    Association 100(469)).
+    """
+    final = refined.fitted
     seen = final.ledger.seen
-    members = np.flatnonzero(seen)
-    sets = [_numbers(final, final.coefficients)]
-    for k in members:
+    sets = []
+    for k in np.flatnonzero(seen):
         others = seen.copy()
         others[k] = False
         sets.append(_numbers(final, final.system.blocks.coefficients(others, final.bounds)))
-    table = np.array(sets)
-    count = members.size
-    spread = np.sqrt((count - 1) / count * np.sum((table[1:] - table[1:].mean(axis=0)) ** 2, axis=0))
-    grid = np.zeros(table.shape[1])
+    values = _numbers(final, final.coefficients)
+    spread = np.diag(scatter(np.array(sets)))
+    grid = np.zeros(values.size)
     for b in beside:
-        apart = np.abs(_numbers(b.fitted, b.fitted.coefficients) - table[0])
+        apart = np.abs(_numbers(b.fitted, b.fitted.coefficients) - values)
         grid = np.maximum(grid, _weight(final, b.fitted) * apart)
     m, now = believed.mechanics, extended.mechanics
-    table[0, :2] = now.mass, now.viscous  # with what was folded into them
+    values[:2] = now.mass, now.viscous  # with what was folded into them
+    if refined.knobs:
+        # What the entries' own numbers leave open, these do, as far as they make up for them.
+        pulled = _pulled(believed, refined, values)
+        spread = spread + np.einsum("ik,kl,il->i", pulled, covariance(refined), pulled)
     friction = believed.friction
     own = level_and_reach(friction.elements) if isinstance(friction, MaxwellSlip) else (0.0, 0.0)
-    before = [m.mass, m.viscous, m.micro_damping, *own]
+    before = np.array([m.mass, m.viscous, m.micro_damping, *own])
+    half = worse * np.sqrt(WIDE**2 * np.maximum(spread, 0.0) + grid**2 + (MODEL * values) ** 2)
+    # What is held at its bound is so by the belief, not by the recording: its interval reaches back to it.
+    held = np.zeros(values.size)
+    for i in range(FIXED):
+        if before[i] > 0 and abs(abs(values[i] / before[i] - 1.0) / BELIEVED - 1.0) < 0.05:
+            held[i] = BELIEVED * before[i]
     names = ("mass", "viscous", "micro_damping", "friction.level", "friction.reach")
     units = ("kg", "N s/m", "N s/m", "N", "m")
+    moved = np.abs(values - before)
+    tell = (before > 0) & (moved > MOVED * before) & (moved > held * (1.0 - 1e-6))
+    clear = np.where(tell, moved / np.maximum(half, 1e-300), 0.0)
+    wider = widening(clear, int(np.count_nonzero(before > 0)))
     found = []
-    for i, (name, unit, old) in enumerate(zip(names, units, before, strict=True)):
-        new = float(table[0, i])
-        half = worse * float(np.sqrt((WIDE * spread[i]) ** 2 + grid[i] ** 2 + (MODEL * new) ** 2))
-        if i < 3 and old > 0 and abs(abs(new / old - 1.0) / BELIEVED - 1.0) < 0.05:
-            half = max(half, BELIEVED * old)  # held there by the belief, not by the recording
-        if old > 0 and abs(new / old - 1) > MOVED and abs(new - old) > half:
-            value = Value(new, max(new - half, 0.0), new + half, for_axis(unit, believed.axis))
-            found.append(Retuned(name, float(old), value))
+    for i in np.flatnonzero(clear > wider).tolist():
+        new, size = float(values[i]), float(max(wider * half[i], held[i]))
+        value = Value(new, max(new - size, 0.0), new + size, for_axis(units[i], believed.axis))
+        found.append(Retuned(names[i], float(before[i]), value))
     return found
+
+
+def widening(clear: Floats, family: int) -> float:
+    """Return by how much intervals widen when only numbers that moved beyond them are told.
+
+    `clear` are the moves in half widths of plain 95 % intervals, of a `family` of numbers.
+    """
+    from scipy.stats import t as student
+
+    order = np.sort(clear)[::-1]
+    for told in range(family, 0, -1):
+        wider = float(student.ppf(1.0 - 0.025 * told / family, FREEDOM)) / WIDE
+        if order[told - 1] > wider:
+            return wider
+    return np.inf
+
+
+def _pulled(believed: Stage, refined: Refined, values: Floats) -> Floats:
+    """Return how each of `_numbers` changes with a step of each knob, (5, q), with what is folded into it."""
+    pulled = USUAL * values[:, None] * refined.away
+    for k, knob in enumerate(refined.knobs):
+        name = refined.entries[knob.entry]["name"]
+        if name == "inertia":
+            pulled[0, k] += values[0] * knob.step / _value(refined, knob)
+        elif name == "viscous-friction" and believed.mechanics.viscous > 0:
+            pulled[1, k] += knob.step
+    return pulled
 
 
 def _numbers(fitted: Fitted, c: Floats) -> Floats:

@@ -97,9 +97,10 @@ def diagnose(
         fit = Fit(fit.before, fit.retuned, fit.before, fit.floor)
     say(0.4, "locate")
     where = locate(motion, base.residual, final.residual if named else None, seed, stage.axis)
-    beside = neighbours(stage, motion, decision.refined if final is not base else refine(base, motion, []))
+    refined = decision.refined if final is not base else refine(base, motion, [])
+    beside = neighbours(stage, motion, refined)
     effects = _effects(decision, named, base, final, least, motion, beside)
-    retuned = retunings(stage, final, beside, extended, birge(final, least))
+    retuned = retunings(stage, refined, beside, extended, birge(final, least))
     folded = bool(entries_found) and not named and extended is not stage
     verdict = _verdict(effects, final, floor, least, fit, folded)
     if verdict == "consistent":

@@ -16,7 +16,7 @@ Within a place, effects run by `order`, lowest first. The drive's orders stand i
 `sensor`; mechanics: mass (10), then what adds forces (50), then second masses, which take from MASS what is
 left (60 resonance; 70 backlash, after which MOVED and VELOCITY are the load's). Friction::
 
-     5  frictional-lag                  sets LATE
+     5  frictional-lag                  sets LATE, LATE_MIDWAY
     10  asymmetric-viscous-friction     sets SKEW
     20  stribeck                        REACH  (the yield level at equal stiffness)
         load-dependent-friction         REACH

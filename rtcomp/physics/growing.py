@@ -21,9 +21,11 @@ GROWTH = (STIFFENING, FOLLOWING)
 
 
 @compiled
-def grow(w: Floats, factor: float, stiffening: float, following: float) -> None:
+def grow(w: Floats, factor: float, midway: float, stiffening: float, following: float) -> None:
     """Multiply the level of friction by `factor`, its stiffness by factor^stiffening.
 
+    `factor` is that at the end of the step, where the force is; `midway` that of the step's middle, under
+    which its displacement is made: the same where it hardly changes within a step.
     The force of what sticks is multiplied at once by factor^following; what is left of the level comes with
     further motion. Contacts whose stiffness grows bear more where they stand: they follow at least as much.
     """
@@ -32,5 +34,5 @@ def grow(w: Floats, factor: float, stiffening: float, following: float) -> None:
         return
     follows = max(following, stiffening)
     w[SCALE] *= factor**follows
-    w[MOVED] *= factor ** (stiffening - follows)
+    w[MOVED] *= midway ** (stiffening - follows)
     w[REACH] *= factor ** (1.0 - follows)

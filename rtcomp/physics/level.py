@@ -6,7 +6,7 @@ import math
 
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics.effect import Parameter
-from rtcomp.physics.wires import ACCELERATION, LATE, SKEW, STEP, VELOCITY
+from rtcomp.physics.wires import ACCELERATION, LATE, LATE_MIDWAY, SKEW, STEP, VELOCITY
 
 COULOMB = Parameter("coulomb", "N", 0.0, 1e6, "friction of fast sliding, without viscous part", open_low=True)
 STATIC = Parameter("static", "N", 0.0, 1e6, "friction at the limit of low speed", open_low=True)
@@ -31,12 +31,23 @@ def stribeck_level(coulomb: float, static: float, velocity: float, exponent: flo
 
 @compiled
 def speed_midway(w: Floats) -> float:
-    """Return the velocity (m/s) in the middle of the step that the wires are at the end of.
+    """Return the speed (m/s) that levels follow in the middle of the step that the wires are at the end of.
 
-    A step's displacement is made under the level of its middle: with that of its end, friction would run
-    ahead of the motion by half a step, first-order in it, and stick-slip lives on the difference.
+    For models that integrate a state over the step. Its displacement is made under the level of its middle:
+    with that of its end, friction would run ahead of the motion by half a step, first-order in it, and
+    stick-slip lives on the difference.
     """
-    return float(w[VELOCITY] - w[LATE] - 0.5 * w[STEP] * w[ACCELERATION])
+    return float(w[VELOCITY] - 0.5 * w[STEP] * w[ACCELERATION] - w[LATE_MIDWAY])
+
+
+@compiled
+def speed_now(w: Floats) -> float:
+    """Return the speed (m/s) that levels follow at the end of the step.
+
+    For what limits or multiplies a force, which is that of the end: with the middle's, friction along a
+    recording would come half a row late.
+    """
+    return float(w[VELOCITY] - w[LATE])
 
 
 @compiled

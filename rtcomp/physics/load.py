@@ -13,7 +13,8 @@ from rtcomp.physics.wires import DRIVE, GRIP_LEVEL, PUSH
 def load_dependent_friction(p: Floats, s: Floats, w: Floats) -> None:
     """p: coefficient (1), external (1), stiffening (1), following (1)."""
     if w[GRIP_LEVEL] > 0.0:
-        grow(w, 1.0 + abs(p[0] * w[DRIVE] - p[1] * w[PUSH]) / w[GRIP_LEVEL], p[2], p[3])
+        factor = 1.0 + abs(p[0] * w[DRIVE] - p[1] * w[PUSH]) / w[GRIP_LEVEL]
+        grow(w, factor, factor, p[2], p[3])
 
 
 @register

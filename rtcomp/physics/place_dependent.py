@@ -17,7 +17,8 @@ def position_dependent_friction(p: Floats, s: Floats, w: Floats) -> None:
     """p: amplitude (1), period (m), phase (rad), slope (1/m), stiffening (1), following (1)."""
     x = w[POSITION]
     factor = 1.0 + p[0] * math.sin(2.0 * math.pi * x / p[1] + p[2]) + p[3] * x
-    grow(w, max(factor, 1e-3), p[4], p[5])  # friction never drives
+    factor = max(factor, 1e-3)  # friction never drives
+    grow(w, factor, factor, p[4], p[5])
 
 
 @register

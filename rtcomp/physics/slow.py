@@ -32,7 +32,8 @@ def stiction_ageing(p: Floats, s: Floats, w: Floats) -> None:
     slid = abs(inside - s[1]) / p[1]
     renewed = -math.expm1(-slid)
     s[0] += w[STEP] * (renewed / slid if slid > 1e-12 else 1.0) - s[0] * renewed
-    grow(w, 1.0 + p[0] * math.log1p(s[0] / p[2]), p[3], p[4])
+    factor = 1.0 + p[0] * math.log1p(s[0] / p[2])
+    grow(w, factor, factor, p[3], p[4])
 
 
 @effect_kernel

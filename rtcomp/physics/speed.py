@@ -8,8 +8,18 @@ from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
 from rtcomp.physics.growing import GROWTH, grow
-from rtcomp.physics.level import speed_midway, viscous_speed
-from rtcomp.physics.wires import FOLLOWS, FRICTION, LATE, SKEW, STEP, STIFFENS, VELOCITY
+from rtcomp.physics.level import speed_midway, speed_now, viscous_speed
+from rtcomp.physics.wires import (
+    ACCELERATION,
+    FOLLOWS,
+    FRICTION,
+    LATE,
+    LATE_MIDWAY,
+    SKEW,
+    STEP,
+    STIFFENS,
+    VELOCITY,
+)  # fmt: skip
 
 
 @effect_kernel
@@ -28,9 +38,9 @@ def micro_damping(p: Floats, s: Floats, w: Floats) -> None:
 @effect_kernel
 def stribeck(p: Floats, s: Floats, w: Floats) -> None:
     """p: rise (1), velocity (m/s), stiffening (1), following (1)."""
-    ratio = speed_midway(w) / p[1]
-    factor = 1.0 + p[0] * math.exp(-ratio * ratio)
-    grow(w, factor, max(p[2], w[STIFFENS]), max(p[3], w[FOLLOWS]))
+    now, midway = speed_now(w) / p[1], speed_midway(w) / p[1]
+    factor, halfway = 1.0 + p[0] * math.exp(-now * now), 1.0 + p[0] * math.exp(-midway * midway)
+    grow(w, factor, halfway, max(p[2], w[STIFFENS]), max(p[3], w[FOLLOWS]))
 
 
 @effect_kernel
@@ -47,12 +57,17 @@ def frictional_lag(p: Floats, s: Floats, w: Floats) -> None:
     """
     v, h = w[VELOCITY], w[STEP]
     if p[0] <= 0.0:
-        s[0] = v
-    elif h > 0.0:
+        s[0] = s[1] = v
+        w[LATE] = w[LATE_MIDWAY] = 0.0
+        return
+    before = s[0]
+    if h > 0.0:
         keep = math.exp(-h / p[0])
         s[0] = v + (s[0] - s[1]) * keep - (v - s[1]) * -math.expm1(-h / p[0]) * p[0] / h
     s[1] = v
     w[LATE] = v - s[0]
+    # What lags changes less over the step than the velocity does.
+    w[LATE_MIDWAY] = v - 0.5 * h * w[ACCELERATION] - 0.5 * (before + s[0])
     w[STIFFENS], w[FOLLOWS] = p[1], p[2]
 
 

@@ -176,3 +176,26 @@ def test_the_sensor_is_undone_in_reverse_order_and_its_delay_by_looking_ahead():
     assert np.abs(found - expected)[:-3].max() < 1e-10
     assert np.all(found[-2:] == found[-2])
     assert np.array_equal(true_position(QUIET, t, reading), reading)
+
+
+@pytest.mark.parametrize("following", [0.0, 1.0])
+@pytest.mark.parametrize("lag", [0.0, 3e-3, 0.2])
+def test_friction_that_falls_with_speed_is_not_late_where_rows_are_long(lag, following):
+    """Its level is that of the speed at the row, not half a row before: a lag would come out too small."""
+    chain = [
+        physics.build({"name": "frictional-lag", "time_constant": lag}),
+        physics.build({"name": "stribeck", "rise": 0.4, "velocity": 4e-3, "following": following}),
+        QUIET.friction,
+    ]
+
+    def friction(parts):
+        time = np.arange(1500 * parts) / (1000.0 * parts)
+        angle = 8 * np.pi * time
+        x, v, a = 2e-4 * np.sin(angle), 16e-4 * np.pi * np.cos(angle), -1.28e-2 * np.pi**2 * np.sin(angle)
+        return forces(QUIET, chain, time, x, v, a, 0.0 * time).friction[::parts]
+
+    fine, coarse = friction(32), friction(1)
+    rows = np.arange(fine.size)
+    late = np.interp(rows - 0.5, rows, fine)
+    sliding = (np.abs(np.sin(8e-3 * np.pi * rows)) < 0.5) & (rows > 200)  # what changes is the level
+    assert np.std((coarse - fine)[sliding]) < 0.1 * np.std((late - fine)[sliding])

@@ -1,0 +1,65 @@
+"""How certain numbers are said to be: by blocks left out, by what entries leave open, by being chosen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from recorded import run, there_and_back
+from recorded import stage as axis
+
+from rtcomp.diagnosis.base import fit_base
+from rtcomp.diagnosis.certain import covariance, retunings, scatter, widening
+from rtcomp.diagnosis.extend import extended_stage
+from rtcomp.diagnosis.motion import prepare
+from rtcomp.diagnosis.refine import refine
+
+
+def test_blocks_left_out_tell_how_uncertain_a_mean_is() -> None:
+    chance = np.random.default_rng(5)
+    found = []
+    for _ in range(400):
+        blocks = chance.standard_normal((20, 2)) * [1.0, 3.0]
+        found.append(scatter((blocks.sum(axis=0) - blocks) / 19.0))
+    mean = np.mean(found, axis=0)
+    assert np.diag(mean) == pytest.approx([1.0 / 20.0, 9.0 / 20.0], rel=0.15)
+    assert abs(mean[0, 1]) < 0.01
+
+
+def test_blocks_like_their_neighbours_count_as_fewer() -> None:
+    chance = np.random.default_rng(6)
+    plain, alike = [], []
+    for _ in range(200):
+        walk = chance.standard_normal((21, 1))
+        plain.append(scatter(walk[1:])[0, 0])
+        alike.append(scatter((walk[1:] + walk[:-1]) / np.sqrt(2.0))[0, 0])
+    assert np.mean(alike) > 1.2 * np.mean(plain)
+
+
+def test_numbers_told_because_they_moved_have_wider_intervals() -> None:
+    """As Benjamini and Yekutieli have it: all chosen, plain intervals; one of many, much wider ones."""
+    assert widening(np.full(5, 9.0), 5) == pytest.approx(1.0, rel=1e-3)
+    one, two = widening(np.array([9.0, 0, 0, 0, 0]), 5), widening(np.array([9.0, 9.0, 0, 0, 0]), 5)
+    assert 1.1 < two < one < 1.6
+    assert widening(np.array([1.1, 0, 0, 0, 0]), 5) == np.inf  # too little to be told
+
+
+def test_what_scales_all_numbers_leaves_them_as_open_as_itself_is() -> None:
+    """A gain that is not there is made up for by mass and friction: none of them is known to have moved."""
+    stage = axis()
+    motion = prepare(stage, [run(stage, there_and_back(8.0))])
+    base = fit_base(stage, motion)
+    refined = refine(base, motion, [{"name": "drive-gain", "gain": 0.9}], tries=1)
+    level = stage.friction.level  # type: ignore[union-attr]
+    told = retunings(stage, refined, [], extended_stage(stage, refined.fitted, []))
+    assert all(r.after.low <= level <= r.after.high for r in told if r.parameter == "friction.level")
+    assert float(np.sqrt(covariance(refined)[0, 0])) * refined.knobs[0].step > 0.01
+
+
+def test_a_mass_that_is_another_is_told_with_an_interval_that_holds_it() -> None:
+    true, believed = axis(mass=2.0 * 1.09), axis()
+    motion = prepare(believed, [run(true, there_and_back(8.0))])
+    refined = refine(fit_base(believed, motion), motion, [])
+    told = {r.parameter: r.after for r in retunings(believed, refined, [], believed.with_changes(
+        stage={"mass": float(refined.fitted.coefficients[0])}))}  # fmt: skip
+    assert list(told) == ["mass"]
+    assert told["mass"].low <= true.mass <= told["mass"].high
