@@ -25,8 +25,19 @@ LEAST_ROWS = 50
 
 def motion_notes(model: HysteresisModel, position: Floats) -> list[str]:
     """Say what the motion (m, (K,)) leaves open of the model that was learned from it."""
-    return [*never_reached(model), *one_way(model.basis, position), *too_fine(model.basis, position),
-            *too_far(model.basis, position)]  # fmt: skip
+    of_model = [*learned_nothing(model), *never_reached(model)]
+    basis = model.basis
+    return [*of_model, *one_way(basis, position), *too_fine(basis, position), *too_far(basis, position)]
+
+
+def learned_nothing(model: HysteresisModel) -> list[str]:
+    """Say that the model is empty."""
+    if model.weights.any():
+        return []
+    return [
+        "nothing was learned: all weights are 0, and with them the model's friction; the other notes and the "
+        "events say whether the axis moved too little or the identifier was put aside"
+    ]
 
 
 def range_of(basis: Basis) -> float:

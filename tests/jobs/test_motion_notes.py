@@ -47,6 +47,11 @@ def test_what_the_motion_lacks_is_said_once(position, says):
     assert len(found) == 1 and says in found[0] and "\n" not in found[0]
 
 
+def test_an_empty_model_is_said_to_be_empty():
+    found = motion_notes(HysteresisModel(BASIS, np.zeros(20), reached=reached(BASIS, LOOP)), LOOP)
+    assert len(found) == 1 and found[0].startswith("nothing was learned")
+
+
 def test_they_reach_the_user(leuven, tmp_path):
     path = tmp_path / "oneway.csv"
     rows = np.column_stack([TIME, 1e-4 * TIME / 4, 0.2 * np.tanh(TIME)])
