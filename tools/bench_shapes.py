@@ -110,7 +110,7 @@ def best_rival(rows: Sequence[dict[str, Any]], key: str) -> tuple[float, str]:
     return float(best[key]), str(best["name"])
 
 
-def piezo(path: Path) -> tuple[list[Figure], list[dict[str, Any]]]:
+def piezo(path: Path, every: bool = True) -> tuple[list[Figure], list[dict[str, Any]]]:
     from scipy.io import loadmat
 
     data = loadmat(path)
@@ -156,7 +156,7 @@ def piezo(path: Path) -> tuple[list[Figure], list[dict[str, Any]]]:
             )
             for smooth, errors in spread.items()
         ),
-        *divided(loops),
+        *(divided(loops) if every else []),
     ], rows
 
 
@@ -319,13 +319,16 @@ def speed() -> list[Figure]:
 
 @click.command(help=__doc__)
 @click.argument("data", required=False, type=click.Path(path_type=Path, exists=True, file_okay=False))
-@click.option("--quick", is_flag=True, help="Fewer cycles of the simulated rig.")
+@click.option(
+    "--quick", is_flag=True, help="Fewer cycles of the simulated rig, the piezo divided in one way."
+)
 @click.option("--json", "path", type=click.Path(path_type=Path))
 def main(data: Path | None, quick: bool, path: Path | None) -> None:
     figures, details = [], {}
     for name, place, case in (
-        ("piezo", "piezo/MeasurementData.mat", piezo), ("joint", "heads-yaw/yaw_sine_to_330s.csv.gz", joint),
-    ):  # fmt: skip
+        ("piezo", "piezo/MeasurementData.mat", lambda path: piezo(path, not quick)),
+        ("joint", "heads-yaw/yaw_sine_to_330s.csv.gz", joint),
+    ):
         if data is None or not (data / place).exists():
             click.echo(f"skipped: {place}; name the folder that holds it")
             continue

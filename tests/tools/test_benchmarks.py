@@ -20,7 +20,7 @@ TOP = Path(__file__).resolve().parents[2]
 BENCHMARKS = sorted(path.name for path in (TOP / "tools").glob("bench_*.py"))
 
 
-def bench(name: str, *arguments: object, timeout: float = 300.0) -> str:
+def bench(name: str, *arguments: object, timeout: float = 600.0) -> str:
     done = subprocess.run(
         [sys.executable, f"tools/{name}", *map(str, arguments)], cwd=TOP, capture_output=True, text=True,
         timeout=timeout, stdin=subprocess.DEVNULL,
