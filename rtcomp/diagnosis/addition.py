@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtcomp.diagnosis.alike import ONE_THING, SHAPELESS, last, least_far, plainest
-from rtcomp.diagnosis.base import SCALES, Fitted, fit_base
+from rtcomp.diagnosis.base import FIXED, SCALES, Fitted, fit_base
 from rtcomp.diagnosis.candidates import effect_of
+from rtcomp.diagnosis.ledger import WHOLE
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Refined, refine
 from rtcomp.diagnosis.scene import Entry, Scene
@@ -28,9 +29,15 @@ NEARLY = 0.93
 BESIDE = {"backlash": "resonance", "resonance": "backlash"}
 """Entries not looked for beside each other: a play has a contact that rings, a second mass goes loose."""
 
-UNDECIDED = {"asymmetric-friction": "closing"}
+UNDECIDED = {"asymmetric-friction": "closing", "load-dependent-friction": "following"}
 """Entries whose forms, by this parameter, only a settled fit tells apart: one asks for the whole of friction,
 of which the base that has bent to the effect gives a wrong picture."""
+AGAIN, GAINS = 2, 0.05
+"""Times that entries beside each other are settled once more, and the part of the error that this must gain
+for another time."""
+AGREE, AGREED = 2, 0.02
+"""Times that friction is found anew where an effect asks for the whole of it, and the part of its level up to
+which that which was asked for and that which was found are the same."""
 
 Progress = Callable[[float, str], None]
 
@@ -78,7 +85,7 @@ def best_addition(
     for i, r in enumerate(tried[:CONTENDERS]):
         if gains[last(r)] > 0.5 * gains[last(tried[0])]:
             # On its own grid of reaches: a base that has bent to an effect is no fair ground for its name.
-            forms = [settle(stage, motion, form, SCALES) for form in (r, *also.get(last(r), []))]
+            forms = [_well_settled(stage, motion, form) for form in (r, *also.get(last(r), []))]
             tried[i] = min(forms, key=lambda form: float(form.errors.sum()))
             gains[last(r)] = 1.0 - float(tried[i].errors.sum() / current.errors.sum())
     tried = plainest(tried)
@@ -112,10 +119,11 @@ def _quickly(current: Fitted, motion: Motion, entries: list[Entry], screened: Sc
     Empty where none can be evaluated.
     """
     found = []
-    for variant in [*_variants(screened.entry, current.ledger.stage), *screened.forms]:
+    variants = [(v, screened.ground) for v in _variants(screened.entry, current.ledger.stage)]
+    for variant, ground in [*variants, *((form.entry, form.ground) for form in screened.forms)]:
         try:
             made = [*entries, variant]
-            tried = refine(current, motion, made, which=[len(entries)], tries=QUICK)
+            tried = refine(ground or current, motion, made, which=[len(entries)], tries=QUICK)
         except (ConfigError, np.linalg.LinAlgError):
             continue
         if not _below_a_count(tried.entries[-1], current.ledger.stage):
@@ -138,6 +146,19 @@ def _handicap(entry: Entry) -> float:
     return 1.1 if "harmonics" in entry else 1.0
 
 
+def _well_settled(stage: Stage, motion: Motion, refined: Refined) -> Refined:
+    """Settle an entry on its own grid; beside others until that gains no more: they had done for it too."""
+    found = settle(stage, motion, refined, SCALES)
+    for _ in range(AGAIN if len(refined.entries) > 1 else 0):
+        further = settle(stage, motion, found)
+        gained = 1.0 - float(further.errors.sum() / found.errors.sum())
+        if gained > 0.0:
+            found = further
+        if gained < GAINS:
+            break
+    return found
+
+
 def settle(
     stage: Stage, motion: Motion, refined: Refined, scales: tuple[float, ...] | None = None
 ) -> Refined:
@@ -146,4 +167,22 @@ def settle(
     around = refined.fitted.scale
     near = tuple(sorted({*(around * f for f in (0.8, 0.9, 1.0, 1.12, 1.25)), 1.0}))
     base = fit_base(stage, motion, scales=scales or near, effects=effects)
-    return refine(base, motion, refined.entries)
+    found = refine(base, motion, refined.entries)
+    for _ in range(AGREE):
+        if _agrees(found):
+            break
+        # Sizes refined on friction that is not the one found beside them hold for neither.
+        effects = [effect_of(e) for e in found.entries]
+        base = fit_base(stage, motion, scales=(found.fitted.scale,), effects=effects)
+        found = refine(base, motion, found.entries, tries=4)
+    return found
+
+
+def _agrees(refined: Refined) -> bool:
+    """Tell whether the friction that entries were given is the one found with them at work."""
+    if not any(e.name in WHOLE for e in map(effect_of, refined.entries)):
+        return True
+    ledger = refined.fitted.ledger
+    now = refined.fitted.coefficients[FIXED : FIXED + ledger.reaches.size]
+    apart = np.abs(np.cumsum((now - ledger.weights) * ledger.reaches))
+    return bool(apart.max() <= AGREED * float(now @ ledger.reaches))

@@ -7,7 +7,6 @@ it is along its branch) is given that of the friction at hand, of which the unit
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,7 +18,7 @@ from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.physics.program import Program, renew, run_chain
 from rtcomp.physics.speed import MicroDamping, ViscousFriction
 from rtcomp.physics.wires import COUNT, FRICTION, GRAIN, GRIP, GRIP_LEVEL, GRIP_STIFFNESS
-from rtcomp.stage.balance import along_row
+from rtcomp.stage.balance import along_row, around_rows, parts_of
 from rtcomp.stage.stage import Stage
 
 SPEED_UNITS = 2
@@ -37,7 +36,7 @@ def units_along(
     motion: Floats,
     grain: float,
 ) -> Floats:
-    """Return the force (N) of each unit along a motion, (K, 2 + reaches).
+    """Return the force (N) of each unit around the rows of a motion, (K, 2 + reaches).
 
     `motion` is (K, 5): time (s), position (m), velocity, acceleration, the command held up to each row (V);
     `weights` (N/m) of the stop elements make the friction at hand. `drive` effects only tell the load.
@@ -57,17 +56,18 @@ def units_along(
     after = [e for e in after if e.name != ClosingBranches.name]
     program = Program([*before, *units, *bent, *after])
     row = float((motion[-1, 0] - motion[0, 0]) / max(motion.shape[0] - 1, 1))
-    longest = min((e.longest_step() for e in [*before, *after]), default=math.inf)
-    parts = max(math.ceil(row / longest - 1e-9), 1)
+    parts = parts_of([*before, *after], row)
     out = np.empty((motion.shape[0], len(units)))
+    rising, falling = (np.zeros_like(out) if parts > 1 else out[:1] for _ in range(2))
     w = np.zeros(COUNT)
     w[GRAIN] = grain
     base = np.array([stage.mass, stage.force_constant])
     first = len(before), len(before) + SPEED_UNITS
     _along(
-        program.steps, program.p, program.s, w, base, motion, parts, *first, len(bent), weights, reaches, out
-    )
-    return out
+        program.steps, program.p, program.s, w, base, motion, parts, *first, len(bent), weights, reaches, out,
+        rising, falling,
+    )  # fmt: skip
+    return around_rows(out) if parts == 1 else rising + np.append(falling[1:], falling[-1:], axis=0)
 
 
 @compiled
@@ -85,17 +85,22 @@ def _along(
     weights: Floats,
     reaches: Floats,
     out: Floats,
+    rising: Floats,
+    falling: Floats,
 ) -> None:
-    """Fill `out`; units are the effects from `first` on, stop elements those from `elements` on.
+    """Fill `out` with forces at the rows: units are the effects from `first` on, elements from `elements` on.
 
-    After these come `bent` effects that bend branches. What else changes the whole of friction is shared out
-    among the stop elements in proportion to what each holds.
+    Where rows are cut into `parts`, also their means over the row before each, weighed by what has passed
+    of it (`rising`) and by what is to come (`falling`). After the elements come `bent` effects that bend
+    branches. What else changes the whole of friction is shared out among the elements in proportion to what
+    each holds.
     """
     count = weights.size
     level = stiffness = 0.0
     for i in range(count):
         level += weights[i] * reaches[i]
         stiffness += weights[i]
+    last = np.zeros(out.shape[1])
     for k in range(motion.shape[0]):
         for j in range(1, parts + 1):
             along_row(w, motion, k, j, parts)
@@ -120,6 +125,13 @@ def _along(
             if whole != 0.0:
                 for i in range(elements - first, out.shape[1]):
                     out[k, i] *= w[FRICTION] / whole
+            if parts > 1:
+                passed = (j - 0.5) / parts
+                for i in range(out.shape[1]):
+                    share = 0.5 * (last[i] + out[k, i]) / parts
+                    last[i] = out[k, i]
+                    rising[k, i] += passed * share
+                    falling[k, i] += (1.0 - passed) * share
 
 
 @compiled

@@ -1,16 +1,22 @@
 """Deciding: which entries are named, by what they explain of motion left out of the fit.
 
-Forward with a full refit, each looked for again with the others at work, backward deletion. An entry is
-accepted where it explains a part of the excess over the floor that is no accident of one stretch; the set of
-names is all that explain it as well on this recording.
+Forward with a full refit, each looked for again with the others at work, backward deletion. `accept` says
+which entries count; the set of names is all that explain the same as well on this recording.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
+from rtcomp.diagnosis.accept import (
+    ABOVE_FLOOR,
+    NEAR,
+    SETTLED,
+    modelled,
+    settles_the_rest,
+    stands_out,
+    worth_it,
+)
 from rtcomp.diagnosis.addition import Addition, Progress, best_addition, settle
 from rtcomp.diagnosis.alike import ONE_THING, SHAPELESS, alike, last
 from rtcomp.diagnosis.base import Fitted
@@ -23,35 +29,6 @@ from rtcomp.stage.stage import Stage
 
 MOST = 4
 """Entries named at the most: beyond, a recording does not carry the decision."""
-LEAST_SHARE = 0.04
-"""Part of the present squared error that an entry must explain to be worth naming."""
-STEADY = 0.8
-"""Part of the blocks in which it must do no harm,"""
-AMENDS = 0.15
-"""unless all harm together is less than this part of what it gains: two effects may hide in each other."""
-ABOVE_FLOOR = 1.6
-"""Squared error over the floor's, below which nothing is missing."""
-NEAR = 2.5
-"""Squared error over the floor's, below which a free curve must stand out: it fits rounding as well."""
-SETTLED = 0.004
-"""Part of the first excess over the floor, below which what is left is how the kernels model, not physics."""
-BESIDE, MORE = 0.15, 0.3
-"""Part of what the entries before it explain, from which on a further entry counts beside them, and the part
-of what is left that it must explain then;"""
-REST = 0.6
-"""part of what is left that it must explain else,"""
-LEAST_BESIDE = 0.05
-"""and part of what those before it explain,"""
-ALL = 0.85
-"""unless it explains this part of all that is left: what is wrong with the first is not so well explained."""
-NOISE, STEADILY = 0.7, 0.4
-"""Times the floor that an entry must gain to be worth naming: in general, and where nearly all blocks gain
-and it explains most of what is left."""
-DISTINCT, DOUBTLESS, MOST_BLOCKS = 0.2, 3.0, 0.75
-"""Part of the error that an entry must explain where the level of it says nothing, standard errors of the
-logarithm of what it leaves of a block, and the part of the blocks that must gain."""
-SURE = 8.0
-"""Standard errors of what it gains, in nearly all blocks, from which on it counts beside others as well."""
 RIVAL, HALF = 0.7, 0.3
 """Part of the first entry's gain from which on another is tried in its place: in general, and in the place of
 a free curve,"""
@@ -134,7 +111,8 @@ def decide(
     for step in range(MOST):
         if current.errors.sum() < ABOVE_FLOOR * floor.sum() and not (looked_at and not entries):
             break
-        if entries and current.errors.sum() - floor.sum() < SETTLED * (base.errors.sum() - floor.sum()):
+        explained = modelled((str(e["name"]) for e in entries), (c.gain for c in choices))
+        if entries and current.errors.sum() - floor.sum() < SETTLED * explained:
             break
         added = ahead or best_addition(stage, motion, current, entries, part_of(step), without)
         ahead = None
@@ -148,17 +126,17 @@ def decide(
             break
         near = step == 0 and current.errors.sum() < NEAR * floor.sum()
         shapeless = last(best) in SHAPELESS
-        if not together and not _worth_it(current.errors, best.errors, floor):
-            if step > 0 or shapeless or not _stands_out(current.errors, best.errors):
+        if not together and not worth_it(current.errors, best.errors, floor):
+            if step > 0 or shapeless or not stands_out(current.errors, best.errors):
                 break
             decision.faint = True
-        elif near and shapeless and not _stands_out(current.errors, best.errors):
+        elif near and shapeless and not stands_out(current.errors, best.errors):
             break
-        if entries and not _settles_the_rest(base.errors, current.errors, best.errors, floor):
+        if entries and not settles_the_rest(explained, current.errors, best.errors, floor, shapeless):
             break
-        explained = float(current.errors.sum() - best.errors.sum())
+        gained = float(current.errors.sum() - best.errors.sum())
         names, probability = alike(best, added.others, current, floor)
-        choices.append(Choice(names, probability, explained))
+        choices.append(Choice(names, probability, gained))
         refined = best
         entries, current = refined.entries, refined.fitted
     if len(choices) > 1:
@@ -170,59 +148,6 @@ def decide(
         choice.probability = choice.probability if len(choice.names) > 1 else 1.0
     decision.refined, decision.choices = refined, choices
     return decision
-
-
-def _worth_it(before: Floats, after: Floats, floor: Floats) -> bool:
-    """Tell whether the step from `before` to `after` (squared errors of blocks) is no accident."""
-    gained = before - after
-    share = float(gained.sum() / before.sum())
-    # An effect may show in a few stretches only; what matters is that it does no harm in the others.
-    harmless = float(np.mean(gained > -0.05 * before - floor)) >= STEADY
-    harmless = harmless or -float(np.minimum(gained, 0.0).sum()) < AMENDS * float(gained.sum())
-    helped = int(np.count_nonzero(gained > 0.05 * before))
-    scatter = float(gained.std(ddof=1) / np.sqrt(gained.size))
-    excess = float(before.sum() - floor.sum())
-    broad = helped >= 3 and (float(gained.mean()) > 1.2 * scatter or helped > 0.4 * gained.size)
-    plain = share > 0.5 and float(gained.sum()) > 5.0 * float(floor.sum())
-    throughout = helped >= 0.8 * gained.size and float(gained.sum()) > 0.5 * excess
-    return (
-        share > LEAST_SHARE
-        and harmless
-        and (broad or plain)
-        and float(gained.sum()) > 0.05 * excess
-        and float(gained.sum()) > (STEADILY if throughout else NOISE) * float(floor.sum())
-    )
-
-
-def _stands_out(before: Floats, after: Floats) -> bool:
-    """Tell whether the step from `before` to `after` is no accident, wherever their level is.
-
-    A floor is only as good as the double that it comes from, and a level above it adds up all that is wrong
-    in small. What has the shape of an entry is gone from nearly every block that was left out.
-    """
-    gained = before - after
-    ratio = np.log(np.maximum(before, 1e-300) / np.maximum(after, 1e-300))
-    doubt = float(ratio.std(ddof=1) / np.sqrt(ratio.size))
-    return (
-        float(gained.sum()) > DISTINCT * float(before.sum())
-        and float(ratio.mean()) > DOUBTLESS * doubt
-        and float(np.mean(gained > 0.05 * before)) >= MOST_BLOCKS
-    )
-
-
-def _settles_the_rest(first: Floats, before: Floats, after: Floats, floor: Floats) -> bool:
-    """Tell whether a further entry has a weight of its own, not one that trims how the first is modelled."""
-    gained = float(before.sum() - after.sum())
-    of_rest = gained / float(max(before.sum() - floor.sum(), 1e-300))
-    beside = gained / max(float(first.sum() - before.sum()), 1e-300)
-    each = before - after
-    steady = float(each.mean()) > SURE * float(each.std(ddof=1) / np.sqrt(each.size))
-    everywhere = steady and bool(np.mean(each > 0.05 * before) >= 0.9)
-    return (
-        of_rest > ALL
-        or (beside > BESIDE and of_rest > MORE)
-        or (beside > LEAST_BESIDE and (of_rest > REST or everywhere))
-    )
 
 
 def _look_ahead(
@@ -253,7 +178,7 @@ def _look_ahead(
         and last(r) not in SHAPELESS
         and float(base.errors.sum() - r.errors.sum()) > (HALF if last(best) in SHAPELESS else RIVAL) * gain
     ]
-    if not rivals or not _worth_it(base.errors, best.errors, floor):
+    if not rivals or not worth_it(base.errors, best.errors, floor):
         return first, None
     own = None if settled else best_addition(stage, motion, best.fitted, best.entries, progress, without)
     chosen, ahead = best, own
@@ -261,9 +186,10 @@ def _look_ahead(
     for rival in rivals[:RIVALS]:
         other = best_addition(stage, motion, rival.fitted, rival.entries, progress, without)
         both = other.best
-        if both is None or not _worth_it(base.errors, both.errors, floor):
+        if both is None or not worth_it(base.errors, both.errors, floor):
             continue
-        if not _settles_the_rest(base.errors, rival.errors, both.errors, floor):
+        alone = modelled([last(rival)], [float(base.errors.sum() - rival.errors.sum())])
+        if not settles_the_rest(alone, rival.errors, both.errors, floor):
             continue
         if float(both.errors.sum()) < _most_left(last(chosen), last(both), left, enough):
             chosen, ahead, left = rival, other, float(both.errors.sum())
@@ -328,7 +254,7 @@ def _prune(
     while len(kept.entries) > 1 and at < len(kept.entries):
         without = [e for i, e in enumerate(kept.entries) if i != at]
         fewer = settle(stage, motion, refine(kept.fitted, motion, without, tries=3))
-        if _worth_it(fewer.errors, kept.errors, floor):
+        if worth_it(fewer.errors, kept.errors, floor):
             at += 1
         else:
             kept = fewer

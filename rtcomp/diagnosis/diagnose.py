@@ -8,12 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from rtcomp.diagnosis.accept import ABOVE_FLOOR
 from rtcomp.diagnosis.base import Fitted, fit_base
 from rtcomp.diagnosis.by_position.sticking import MUCH, mostly_hidden
 from rtcomp.diagnosis.by_position.told import told_by_position
 from rtcomp.diagnosis.certain import birge, intervals, neighbours, retunings
 from rtcomp.diagnosis.curves import curves, left_over
-from rtcomp.diagnosis.decide import ABOVE_FLOOR, Choice, Decision
+from rtcomp.diagnosis.decide import Choice, Decision
 from rtcomp.diagnosis.experiment import next_experiment
 from rtcomp.diagnosis.explain import AGREES, NEGLIGIBLE, explain
 from rtcomp.diagnosis.extend import extended_stage

@@ -32,8 +32,8 @@ GRID = 14
 """Reaches of the grid where the believed friction is not a short list of elements."""
 
 
-REMEMBERED = 24
-"""Tables of friction kept at a time: those of the entries that are refined together."""
+REMEMBERED, REMEMBERED_DRIVES = 24, 4
+"""Tables of friction kept at a time, those of the entries that are refined together, and forces of drives."""
 
 
 WHOLE = ("load-dependent-friction", "creep", "non-congruent-friction", ClosingBranches.name)
@@ -72,6 +72,8 @@ class Ledger:
         self._plain: System | None = None
         self._paths: tuple[object, list[tuple[Floats, Floats, Floats]]] = (None, [])
         self._frictions: dict[object, Floats] = {}
+        self._drives: dict[object, list[Floats]] = {}
+        self._loads: tuple[object, list[Floats]] = (None, [])
 
     def weigh(self, weights: Floats) -> None:
         """Take `weights` (N/m) of the stop elements for the friction at hand, where effects ask for it."""
@@ -132,14 +134,16 @@ class Ledger:
                 before += others
         paths = self._kinematics(sensors)
         sides, masses = [], []
-        for strip, (x, v, a) in zip(self.motion.strips, paths, strict=True):
-            f = forces(self.stage, [*modifiers, *others], strip.time, x, v, a, strip.voltage)
-            given = self._given(strip, drive, x, v, a)
-            sides.append(given + around_rows(f.push - f.friction))
-            moved = a * f.mass / self.stage.mass
+        given = self._driven(drive, sensors)
+        for i, (strip, (x, v, a)) in enumerate(zip(self.motion.strips, paths, strict=True)):
+            side, moved = given[i], a
+            if modifiers or others:
+                f = forces(self.stage, [*modifiers, *others], strip.time, x, v, a, strip.voltage)
+                side, moved = side + around_rows(f.push - f.friction), a * f.mass / self.stage.mass
             if play is not None:
-                rest = derivatives(self._behind(x, play), self.motion.period)[1]
+                rest = derivatives(self._behind(sensors, play)[i], self.motion.period)[1]
                 moved = moved + play.values["share"] * (rest - a)
+            sides.append(side)
             masses.append(moved)
         columns = [self.motion.smooth(masses), self._friction(before, modifiers, sensors, play)]
         names = (MASS, VISCOUS, MICRO, *(f"reach {r:.3g}" for r in self.reaches))
@@ -159,7 +163,15 @@ class Ledger:
             self._paths = key, found
         return self._paths[1]
 
-    def _behind(self, x: Floats, play: Effect) -> Floats:
+    def _behind(self, sensors: Sequence[Effect], play: Effect) -> list[Floats]:
+        """Return the position (m) of the load behind a play along each strip; remembers the last ones."""
+        key = (_key(sensors), _key([play]), self.found_with_play and self.weights.tobytes())
+        if self._loads[0] != key:
+            paths = self._kinematics(sensors)
+            self._loads = key, [self._drawn(x, play) for x, _, _ in paths]
+        return self._loads[1]
+
+    def _drawn(self, x: Floats, play: Effect) -> Floats:
         m, friction = self.stage.mechanics, self.stage.friction
         weights, reaches = self.weights, self.reaches
         if isinstance(friction, MaxwellSlip) and not self.found_with_play:
@@ -183,20 +195,33 @@ class Ledger:
         key = (_key(before), _key(modifiers), _key(sensors), plays, weighs and self.weights.tobytes())
         if key not in self._frictions:
             rows = []
-            for strip, (x, v, a) in zip(self.motion.strips, self._kinematics(sensors), strict=True):
+            for i, (strip, (x, v, a)) in enumerate(
+                zip(self.motion.strips, self._kinematics(sensors), strict=True)
+            ):
                 if play is not None:
-                    x = self._behind(x, play)
+                    x = self._behind(sensors, play)[i]
                     v, a = derivatives(x, self.motion.period)
                 held = np.append(strip.voltage[:1], strip.voltage[:-1])
                 motion = np.column_stack([strip.time, x, v, a, held])
                 found = units_along(
                     self.stage, before, modifiers, self.reaches, self.weights, motion, self.grain
                 )
-                rows.append(around_rows(found))
+                rows.append(found)
             if len(self._frictions) >= REMEMBERED:
                 self._frictions.pop(next(iter(self._frictions)))
             self._frictions[key] = self.motion.smooth(rows)
         return self._frictions[key]
+
+    def _driven(self, drive: Sequence[Effect], sensors: Sequence[Effect]) -> list[Floats]:
+        """Return the force of the drive (N) around the rows of each strip; remembered by what changes it."""
+        key = (_key(drive), _key(sensors))
+        if key not in self._drives:
+            paths = zip(self.motion.strips, self._kinematics(sensors), strict=True)
+            found = [self._given(strip, drive, *path) for strip, path in paths]
+            if len(self._drives) >= REMEMBERED_DRIVES:
+                self._drives.pop(next(iter(self._drives)))
+            self._drives[key] = found
+        return self._drives[key]
 
     def _given(self, strip: Strip, drive: Sequence[Effect], x: Floats, v: Floats, a: Floats) -> Floats:
         chain = sorted([*self._drive(), *drive], key=lambda e: e.order)

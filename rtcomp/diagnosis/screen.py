@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rtcomp.diagnosis.base import Fitted
+from rtcomp.diagnosis.base import Fitted, fit_base
 from rtcomp.diagnosis.candidates import effect_of, searches
-from rtcomp.diagnosis.ledger import System
+from rtcomp.diagnosis.ledger import WHOLE, Ledger, System
 from rtcomp.diagnosis.scene import Column, Entry, Point, Scene
+from rtcomp.diagnosis.search_at_work import at_work
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
+from rtcomp.physics import Effect
 
 SIZES = {
     "asymmetric-friction": "asymmetry", "creep": "fraction", "drive-deadband": "width",
@@ -26,6 +28,10 @@ NO_GAIN = 0.97
 """Part of the error left at which an effect as it was tried is of no use; a smaller one may be."""
 SMALLEST, LARGEST = 0.02, 0.8
 """Range of how much smaller."""
+BENT = 1.2
+"""Factor on the believed reaches, up or down, from which on a base has bent to what is missing."""
+SMALL = 0.1
+"""Part of the longest reach up to which a play hides in reaches; a larger one stands out of any."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +41,10 @@ class Screened:
     name: str
     entry: Entry
     errors: Floats
-    forms: tuple[Entry, ...] = ()
+    forms: tuple[Screened, ...] = ()
     """The best starting points of its other forms: a few steps tell which is right, a first look does not."""
+    ground: Fitted | None = None
+    """The base that it was tried on; None where that is the one at hand."""
 
     def gain(self, base: Floats) -> float:
         """Return the part of the base's squared error that is gone."""
@@ -78,17 +86,36 @@ def screen(
                     entry, errors = smaller
         if not np.isfinite(errors).all():
             continue
-        key = (search.name, *_form(entry))
-        if key not in best or errors.sum() < best[key].errors.sum():
-            best[key] = Screened(search.name, entry, errors)
+        _keep(best, Screened(search.name, entry, errors))
         if progress is not None:
             progress((number + 1) / len(all_searches))
+    for one in _as_believed(scene, others, power):
+        _keep(best, one)
     first: dict[str, Screened] = {}
     for one in sorted(best.values(), key=lambda b: float(b.errors.sum())):
         known = first.setdefault(one.name, one)
         if known is not one:
-            first[one.name] = replace(known, forms=(*known.forms, one.entry))
+            first[one.name] = replace(known, forms=(*known.forms, one))
     return list(first.values())
+
+
+def _keep(best: dict[tuple[object, ...], Screened], one: Screened) -> None:
+    """Keep the best of each name and form, on either ground."""
+    key = (one.name, *_form(one.entry), one.ground is None)
+    if key not in best or one.errors.sum() < best[key].errors.sum():
+        best[key] = one
+
+
+def _as_believed(scene: Scene, others: list[Effect], power: float) -> Iterator[Screened]:
+    """Try what other reaches do much of on the believed ones, where those of the base have gone elsewhere."""
+    ledger = scene.fitted.ledger
+    if 1.0 / BENT < scene.fitted.scale < BENT:
+        return
+    for point in at_work(scene):
+        if point.name in WHOLE or _small_play(point.entry, ledger):
+            own = fit_base(ledger.stage, scene.motion, [*others, effect_of(point.entry)], (1.0,))
+            scale = power / max(float(own.system.blocks.power[ledger.seen].sum()), 1e-300)
+            yield Screened(point.name, point.entry, own.errors * scale, ground=own)
 
 
 def _smaller(fitted: Fitted, system: System, tried: Point) -> tuple[Entry, Floats] | None:
@@ -114,3 +141,8 @@ def _form(entry: Entry) -> tuple[bool, ...]:
     """Say in which of its forms an entry is: whether what sticks follows it, whether its branches close,
     whether its contact is soft, whether its wave has a harmonic."""
     return bool(entry.get("following")), "closing" in entry, "contact" in entry, "harmonics" in entry
+
+
+def _small_play(entry: Entry, ledger: Ledger) -> bool:
+    """Tell whether an entry is a play so small that it hides in reaches."""
+    return entry["name"] == "backlash" and float(entry["gap"]) < SMALL * ledger.reaches.max()  # type: ignore[arg-type]

@@ -76,7 +76,7 @@ def _presliding(s: Scene) -> list[Point]:
     points += [
         {"name": "creep", "fraction": f, "time_constant": t} for f in (0.05, 0.2) for t in (0.03, 0.3, 3.0)
     ]
-    for g in (0.01, 0.025, 0.07, 0.2, 0.6, 1.5):
+    for g in (0.002, 0.01, 0.025, 0.07, 0.2, 0.6, 1.5):
         play: Entry = {"name": "backlash", "gap": g * reach}
         points += [play, *({**play, "share": 0.45, "contact": hz} for hz in _contacts(s, 0.45))]
     return [Point(p) for p in points]

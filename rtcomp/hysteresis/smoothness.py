@@ -22,7 +22,7 @@ import numpy.typing as npt
 from rtcomp.kernels import Floats
 
 APART = 1e-6
-"""Share of each variance in which a weight is on its own: smooth is expected, not imposed."""
+"""Share of each variance in which a weight is on its own: so little, the covariance has an inverse."""
 
 Term = tuple[float, float, float]
 """A value of the process in a weight: reach (m), place (m), factor."""

@@ -185,6 +185,10 @@ class Effect:
         """Longest step (s) its kernel bears; rows of a recording are cut into such."""
         return math.inf
 
+    def least_parts(self) -> int:
+        """Parts that a row of a recording is cut into at least: several where its force jumps at the row."""
+        return 1
+
     def companions(self) -> list[Effect]:
         """Effects that it needs elsewhere in the chain and that no stage lists."""
         return []

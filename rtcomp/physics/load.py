@@ -45,3 +45,7 @@ class LoadDependentFriction(Effect):
     example = {"coefficient": 0.05}
     neutral = {"coefficient": 0.0, "external": 0.0}
     order = 20
+
+    def least_parts(self) -> int:
+        """Return 4: the level jumps with the command, and the mean over a row is half a part late."""
+        return 4

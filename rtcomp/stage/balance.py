@@ -10,6 +10,7 @@ starts relaxed at the first row.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,13 +98,19 @@ def forces(
     program = Program([e for e in chain if e.place is not Place.SENSOR])
     out = np.zeros((6, time.size))
     row = float((time[-1] - time[0]) / max(time.size - 1, 1))
-    needed = math.ceil(row / min((e.longest_step() for e in chain), default=math.inf) - 1e-9)
+    needed = parts_of(chain, row)
     motion = np.ascontiguousarray(np.column_stack([time, position, velocity, acceleration, volts]))
     base = np.array([stage.mass, stage.force_constant])
     w = np.zeros(wires.COUNT)
     w[GRAIN] = grain
     _along(program.steps, program.p, program.s, w, base, motion, max(needed, parts), needed > 1, out)
     return Forces(*out)
+
+
+def parts_of(chain: Sequence[Effect], row: float) -> int:
+    """Return the parts into which a row of `row` s is cut for the effects `chain`."""
+    shortest = math.ceil(row / min((e.longest_step() for e in chain), default=math.inf) - 1e-9)
+    return max(1, shortest, *(e.least_parts() for e in chain))
 
 
 @compiled

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtcomp.diagnosis.decide import _most_left, _settles_the_rest, _stands_out, _worth_it
+from rtcomp.diagnosis.accept import modelled, settles_the_rest, stands_out, worth_it
+from rtcomp.diagnosis.decide import _most_left
 from rtcomp.diagnosis.explain import LEAST, MUCH, _explains_little, _holds, _leaves_much
 from rtcomp.diagnosis.result import Fit
 from rtcomp.kernels import Floats
@@ -16,7 +17,7 @@ BLOCKS = 20
 def even(total: float) -> Floats:
     """Squared errors of blocks, all alike but for a little."""
     chance = np.random.default_rng(5).uniform(0.9, 1.1, BLOCKS)
-    return total * chance / chance.sum()
+    return np.asarray(total * chance / chance.sum())
 
 
 @pytest.mark.parametrize(
@@ -32,13 +33,28 @@ def test_a_further_name_counts_by_what_it_explains_of_the_rest(
     before: float, after: float, counts: bool
 ) -> None:
     noisy = np.where(np.arange(BLOCKS) % 2, 1.8, 0.2)
-    first, floor = even(100.0), even(0.01)
-    left = even(before) * noisy
-    assert _settles_the_rest(first, left, left * after / before, floor) is counts
+    left, floor = even(before) * noisy, even(0.01)
+    assert settles_the_rest(100.0 - before, left, left * after / before, floor) is counts
+
+
+def test_what_is_exactly_modelled_leaves_nothing_to_trim() -> None:
+    noisy = np.where(np.arange(BLOCKS) % 2, 1.8, 0.2)
+    left, floor = even(0.2) * noisy, even(0.01)
+    by_hysteresis = modelled(["gravity", "backlash"], [10.0, 90.0])
+    assert by_hysteresis == 90.0
+    assert not settles_the_rest(by_hysteresis, left, 0.5 * left, floor)
+    by_weight = modelled(["gravity", "quadratic-drag"], [10.0, 90.0])
+    assert settles_the_rest(by_weight, left, 0.5 * left, floor)
+
+
+def test_all_that_is_left_is_no_weight_of_a_free_curve() -> None:
+    left, floor = even(1.5), even(0.01)
+    assert settles_the_rest(98.5, left, 0.01 * left, floor)
+    assert not settles_the_rest(98.5, left, 0.01 * left, floor, shapeless=True)
 
 
 @pytest.mark.parametrize(
-    ("part", "blocks", "stands_out"),
+    ("part", "blocks", "does"),
     [
         (0.3, BLOCKS, True),  # gone from every block
         (0.3, 17, True),
@@ -48,12 +64,12 @@ def test_a_further_name_counts_by_what_it_explains_of_the_rest(
 )
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e3])
 def test_an_entry_stands_out_by_what_is_gone_from_the_blocks_not_by_their_level(
-    part: float, blocks: int, stands_out: bool, unit: float
+    part: float, blocks: int, does: bool, unit: float
 ) -> None:
     quiet_and_loud = unit * np.geomspace(1.0, 50.0, BLOCKS)
     chance = np.random.default_rng(7).uniform(0.98, 1.02, BLOCKS)
     after = quiet_and_loud * np.where(np.arange(BLOCKS) >= BLOCKS - blocks, 1.0 - part, 1.0) * chance
-    assert _stands_out(quiet_and_loud, after) is stands_out
+    assert stands_out(quiet_and_loud, after) is does
 
 
 def test_names_that_leave_much_must_explain_most_of_what_was_put_aside() -> None:
@@ -73,7 +89,7 @@ def test_names_that_leave_much_must_explain_most_of_what_was_put_aside() -> None
         (Fit(0.9, 0.73, 0.12, 0.0015), False),  # so large that what is left is trimming
     ],
 )
-def test_a_lone_name_must_not_leave_far_more_than_noise(fit: Fit, much: bool) -> None:
+def test_names_must_not_leave_far_more_than_noise(fit: Fit, much: bool) -> None:
     assert _leaves_much(fit) is much
 
 
@@ -85,10 +101,10 @@ def test_what_happens_once_may_harm_a_little_where_it_does_not_happen() -> None:
 
 def test_a_small_gain_counts_where_nearly_every_block_has_it() -> None:
     floor, before = even(1.0), even(1.8)
-    assert _worth_it(before, before - even(0.55), floor)
+    assert worth_it(before, before - even(0.55), floor)
     # The same gain, had in a third of the blocks only, may be an accident of the floor.
     few = np.where(np.arange(BLOCKS) % 3 == 0, 0.55 * 3 / BLOCKS, 0.0)
-    assert not _worth_it(before, before - few, floor)
+    assert not worth_it(before, before - few, floor)
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ def test_units_with_their_weights_are_the_stages_friction(entries: list[dict[str
         *drive,
         *sorted([*modifiers, *(e for e in stage.chain if e.place is Place.FRICTION)], key=lambda e: e.order),
     ]
-    whole = forces(stage, chain, time, x, v, motion[:, 3], held).friction
+    whole = -forces(stage, chain, time, x, v, motion[:, 3], held).others()
     assert ours == pytest.approx(whole, abs=1e-9 * float(np.abs(whole).max()))
 
 

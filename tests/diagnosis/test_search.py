@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 from recorded import run, stage, there_and_back
 
-from rtcomp.diagnosis.addition import _below_a_count
+from rtcomp.diagnosis.addition import _agrees, _below_a_count, best_addition
 from rtcomp.diagnosis.base import fit_base
 from rtcomp.diagnosis.certain import intervals
 from rtcomp.diagnosis.diagnose import diagnose
 from rtcomp.diagnosis.motion import prepare
-from rtcomp.diagnosis.refine import refine
+from rtcomp.diagnosis.refine import Refined, refine
 from rtcomp.diagnosis.scene import Scene
-from rtcomp.diagnosis.screen import screen
+from rtcomp.diagnosis.screen import BENT, screen
 from rtcomp.diagnosis.search_at_work import _ringing
 
 
@@ -30,10 +30,13 @@ def test_a_small_second_mass_is_looked_for_where_it_rings() -> None:
 def test_a_first_look_keeps_every_form() -> None:
     looked = {s.name: s for s in screen(scene({"name": "constant-force", "force": 0.3}), [])}
     for name in ("stribeck", "frictional-lag", "stiction-ageing", "load-dependent-friction"):
-        both = [looked[name].entry, *looked[name].forms]
+        both = [looked[name].entry, *(form.entry for form in looked[name].forms)]
         assert sorted(bool(entry.get("following")) for entry in both) == [False, True]
     for name, key in (("backlash", "contact"), ("cogging", "harmonics")):
-        assert {key in e for e in (looked[name].entry, *looked[name].forms)} == {False, True}
+        assert {key in e for e in (looked[name].entry, *(f.entry for f in looked[name].forms))} == {
+            False,
+            True,
+        }
 
 
 @pytest.mark.parametrize(
@@ -54,6 +57,38 @@ def test_a_small_effect_is_looked_for_at_its_size(
     assert looked.gain(at.fitted.errors) > 0.1
     ((parameter, truth),) = size.items()
     assert looked.entry[parameter] == pytest.approx(truth, rel=0.5)
+
+
+def found_first(at: Scene) -> Refined:
+    """The entry that explains most of what a recording shows."""
+    best = best_addition(stage(), at.motion, at.fitted, [], lambda _part, _what: None).best
+    assert best is not None
+    return best
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "value"),
+    [
+        ("load-dependent-friction", "coefficient", 0.25),
+        ("non-congruent-friction", "softening", 0.4),
+        ("backlash", "gap", 1.2e-7),
+    ],
+)
+def test_what_other_reaches_do_much_of_is_found_on_the_believed_ones(
+    name: str, size: str, value: float
+) -> None:
+    at = scene({"name": name, size: value})
+    assert at.fitted.scale >= BENT
+    best = found_first(at).entries[-1]
+    assert best["name"] == name
+    assert best[size] == pytest.approx(value, rel=0.12)
+
+
+def test_a_strong_creep_is_settled_on_the_friction_found_beside_it() -> None:
+    best = found_first(scene({"name": "creep", "fraction": 0.7, "time_constant": 0.4}))
+    assert best.entries[-1]["name"] == "creep"
+    assert best.entries[-1]["fraction"] == pytest.approx(0.7, rel=0.15)
+    assert _agrees(best)
 
 
 @pytest.mark.parametrize(("counts", "is_none"), [(0.5, True), (-0.5, True), (1.5, False), (-40.0, False)])

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from recorded import RATE, run, stage, there_and_back
 
+from rtcomp.diagnosis.accept import ABOVE_FLOOR
 from rtcomp.diagnosis.base import Fitted, fit_base
 from rtcomp.diagnosis.candidates import effect_of
-from rtcomp.diagnosis.decide import ABOVE_FLOOR
 from rtcomp.diagnosis.motion import Motion, prepare
 from rtcomp.diagnosis.result import Retuned, Sight, Value
 from rtcomp.diagnosis.sight import pinned, sight
