@@ -165,7 +165,9 @@ def settle(
     """Find the reaches anew with the entries at work, then refine all entries together."""
     effects = [effect_of(e) for e in refined.entries]
     around = refined.fitted.scale
-    near = tuple(sorted({*(around * f for f in (0.8, 0.9, 1.0, 1.12, 1.25)), 1.0}))
+    beside = (around * f for f in (0.8, 0.9, 1.0, 1.12, 1.25))
+    # Where a recording says nothing of reaches, they would go further every time.
+    near = tuple(sorted({1.0, *(min(max(scale, SCALES[0]), SCALES[-1]) for scale in beside)}))
     base = fit_base(stage, motion, scales=scales or near, effects=effects)
     found = refine(base, motion, refined.entries)
     for _ in range(AGREE):

@@ -39,8 +39,8 @@ CONFIRMED = 0.92
 AGREES = 0.006
 """Relative force error up to which a recording is held to agree, whatever its noise promises."""
 FAR, NEARLY_ALL = 4.0, 0.97
-"""Names that leave more than FAR times the floor of what was put aside, and explain less than NEARLY_ALL of
-its squared error above that, are the nearest of the catalogue to something that is not in it."""
+"""A lone name that leaves more than FAR times the floor of what was put aside, and explains less than
+NEARLY_ALL of its squared error above that, is the nearest of the catalogue to something that is not in it."""
 STRAYED = 9.0
 """How much further (see `departure`) than half again the retuning names may take what is believed."""
 AGAIN = 2
@@ -99,7 +99,7 @@ def explain(
         shaped = any(str(e["name"]) not in SHAPELESS for e in entries)
         least_part = MUCH if decision.left(floor) > OPEN else LEAST
         strays = shaped and departure(final) > 1.5 * departure(base) + STRAYED
-        little = shaped and (_explains_little(fit, least_part) or _leaves_much(fit))
+        little = shaped and (_explains_little(fit, least_part) or (len(named) == 1 and _leaves_much(fit)))
         little = little or ((faint or decision.faint) and fit.after > CONFIRMED * fit.retuned)
         once = any(e["name"] == "sensor-jump" for e in named)
         if not named or (_holds(fit, once) and not strays and not little):

@@ -89,7 +89,7 @@ def test_names_that_leave_much_must_explain_most_of_what_was_put_aside() -> None
         (Fit(0.9, 0.73, 0.12, 0.0015), False),  # so large that what is left is trimming
     ],
 )
-def test_names_must_not_leave_far_more_than_noise(fit: Fit, much: bool) -> None:
+def test_a_lone_name_must_not_leave_far_more_than_noise(fit: Fit, much: bool) -> None:
     assert _leaves_much(fit) is much
 
 
