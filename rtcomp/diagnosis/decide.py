@@ -18,7 +18,7 @@ from rtcomp.diagnosis.accept import (
     worth_it,
 )
 from rtcomp.diagnosis.addition import Addition, Progress, best_addition, settle
-from rtcomp.diagnosis.alike import ONE_THING, SHAPELESS, alike, last
+from rtcomp.diagnosis.alike import APART, ONE_THING, SHAPELESS, alike, last
 from rtcomp.diagnosis.base import Fitted
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Refined, refine
@@ -224,14 +224,20 @@ def _exchange(
         if best is None:
             continue
         now = str(refined.entries[at]["name"])
-        same = last(best) == now
+        same = any({last(best), now} <= {now, *group} for group in ((now,), *ONE_THING) if now in group)
         if not same and float(best.errors.sum()) > EXCHANGED * float(refined.errors.sum()):
+            # What it was not told from alone may be told from it with the others at work.
+            most = APART * float(refined.errors.sum())
+            near = {last(r) for r in (best, *added.others) if float(r.errors.sum()) <= most}
+            near |= {name for group in ONE_THING if now in group for name in group}
+            choices[at].names[1:] = [n for n in choices[at].names[1:] if n in near]
             continue
         names, probability = alike(best, added.others, fewer.fitted, floor)
         gained = float(fewer.errors.sum() - best.errors.sum())
         if not same or float(best.errors.sum()) < float(refined.errors.sum()):
             refined = refine(best.fitted, motion, _moved(best.entries, at), tries=1)
-        choices[at] = Choice(names, probability, gained)
+        own = str(refined.entries[at]["name"])
+        choices[at] = Choice([own, *(name for name in names if name != own)], probability, gained)
     return refined
 
 
