@@ -116,3 +116,20 @@ def test_cogging_with_a_harmonic_is_cogging_and_no_free_curve() -> None:
     assert [e.names[0] for e in found.effects] == ["cogging"]
     assert found.effects[0].parameters["period"].value == pytest.approx(4e-5, rel=0.02)
     assert found.fit.after < 0.5 * found.fit.retuned
+
+
+@pytest.mark.slow
+def test_a_weight_beside_a_spring_is_no_end_stop() -> None:
+    """Nor is it a free curve, which explains both at once, or something that only does beside no spring."""
+    hidden = [
+        {"name": "constant-force", "force": 0.9},
+        {"name": "parallel-spring", "stiffness": 700.0, "cubic": 3e10},
+    ]
+    found = diagnose(stage(), [run(stage(effects=hidden), there_and_back(20.0))])
+    assert {e.names for e in found.effects} <= {
+        ("parallel-spring",),
+        ("constant-force", "drive-offset", "gravity"),
+        ("drive-offset", "constant-force", "gravity"),
+    }
+    assert len(found.effects) == 2
+    assert found.fit.after < 0.1 * found.fit.retuned
