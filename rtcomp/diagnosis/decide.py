@@ -224,7 +224,7 @@ def _exchange(
         if best is None:
             continue
         now = str(refined.entries[at]["name"])
-        same = any({last(best), now} <= {now, *group} for group in ((now,), *ONE_THING) if now in group)
+        same = any({last(best), now} <= set(group) for group in ((now,), *ONE_THING))
         if not same and float(best.errors.sum()) > EXCHANGED * float(refined.errors.sum()):
             # What it was not told from alone may be told from it with the others at work.
             most = APART * float(refined.errors.sum())

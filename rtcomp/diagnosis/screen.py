@@ -113,9 +113,13 @@ def _as_believed(scene: Scene, others: list[Effect], power: float) -> Iterator[S
         return
     for point in at_work(scene):
         if point.name in WHOLE or _small_play(point.entry, ledger):
-            own = fit_base(ledger.stage, scene.motion, [*others, effect_of(point.entry)], (1.0,))
+            try:
+                own = fit_base(ledger.stage, scene.motion, [*others, effect_of(point.entry)], (1.0,))
+            except ConfigError:
+                continue
             scale = power / max(float(own.system.blocks.power[ledger.seen].sum()), 1e-300)
-            yield Screened(point.name, point.entry, own.errors * scale, ground=own)
+            if np.isfinite(own.errors).all():
+                yield Screened(point.name, point.entry, own.errors * scale, ground=own)
 
 
 def _smaller(fitted: Fitted, system: System, tried: Point) -> tuple[Entry, Floats] | None:
