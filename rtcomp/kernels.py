@@ -11,6 +11,7 @@ functions. The same source also runs as plain Python on numpy arrays (`Kernel.py
 from __future__ import annotations
 
 import ctypes
+import threading
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
@@ -29,6 +30,9 @@ _BASIS = types.void(_POINTER, _POINTER, _POINTER, types.float64)
 _LEARNER = types.void(_POINTER, _POINTER, _POINTER, _POINTER, types.float64)
 _PLACING = types.void(*[_POINTER] * 10, types.float64, types.float64)
 _REGROUP = types.void(_POINTER, _POINTER, _POINTER, _POINTER)
+
+
+_COMPILING = threading.RLock()
 
 
 def compiled(function: F) -> F:
@@ -50,8 +54,9 @@ class Kernel:
     @property
     def address(self) -> int:
         """The address to hand to `call_effect`, `call_basis` or `call_learner`."""
-        if self._compiled is None:
-            self._compiled = cfunc(self._signature, cache=True)(self.python)
+        with _COMPILING:  # what another thread's address leads to must not be compiled anew
+            if self._compiled is None:
+                self._compiled = cfunc(self._signature, cache=True)(self.python)
         return int(self._compiled.address)
 
     def __call__(self, *arguments: Any) -> None:

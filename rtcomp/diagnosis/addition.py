@@ -10,6 +10,7 @@ import numpy as np
 from rtcomp.diagnosis.alike import ONE_THING, SHAPELESS, last, least_far, plainest
 from rtcomp.diagnosis.base import FIXED, SCALES, Fitted, fit_base
 from rtcomp.diagnosis.candidates import effect_of
+from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.ledger import WHOLE
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Refined, refine
@@ -24,6 +25,9 @@ LEAST_SHARE = 0.008
 """Part of the squared error that a search must explain to be short-listed."""
 QUICK, CONTENDERS = 2, 3
 """Steps of refinement for the whole short list, and how many of it are refined to the end."""
+FAR, NOTHING = 3.0, 0.002
+"""Times the error of the first after those few steps, from which on another is refined to the end only if the
+first leaves more than this part of what there was."""
 NEARLY = 0.93
 """Part of what a shapeless entry explains, from which on a name with a shape of its own is preferred."""
 BESIDE = {"backlash": "resonance", "resonance": "backlash"}
@@ -71,23 +75,22 @@ def best_addition(
     tried: list[Refined] = []
     gains: dict[str, float] = {}
     also: dict[str, list[Refined]] = {}
-    for i, s in enumerate(hopeful):
-        forms = _quickly(current, motion, entries, s)
+    quick = shared(
+        lambda s: _quickly(current, motion, entries, s),
+        hopeful,
+        lambda part: progress(0.6 + 0.4 * part, "refine"),
+    )
+    for s, forms in zip(hopeful, quick, strict=True):
         if not forms:
             continue
         also[s.name] = forms[1:]
         gains[last(forms[0])] = 1.0 - float(forms[0].errors.sum() / current.errors.sum())
         tried.append(forms[0])
-        progress(0.6 + 0.4 * (i + 1) / len(hopeful), "refine")
     tried.sort(key=lambda r: float(r.errors.sum()))
     if not tried:
         return Addition(None, [], looked, gains)
-    for i, r in enumerate(tried[:CONTENDERS]):
-        if gains[last(r)] > 0.5 * gains[last(tried[0])]:
-            # On its own grid of reaches: a base that has bent to an effect is no fair ground for its name.
-            forms = [_well_settled(stage, motion, form) for form in (r, *also.get(last(r), []))]
-            tried[i] = min(forms, key=lambda form: float(form.errors.sum()))
-            gains[last(r)] = 1.0 - float(tried[i].errors.sum() / current.errors.sum())
+    _settle_contenders(stage, motion, current, tried, also)
+    gains |= {last(r): 1.0 - float(r.errors.sum() / current.errors.sum()) for r in tried}
     tried = plainest(tried)
     best = least_far(tried, current)
     if last(best) in SHAPELESS:
@@ -134,6 +137,27 @@ def _quickly(current: Fitted, motion: Motion, entries: list[Entry], screened: Sc
     return [*found[:1], *others[:1]]
 
 
+def _settle_contenders(
+    stage: Stage, motion: Motion, current: Fitted, tried: list[Refined], also: dict[str, list[Refined]]
+) -> None:
+    """Replace the best of `tried`, best first, by what they are on reaches of their own, in the best form.
+
+    A base that has bent to an effect is no fair ground for its name. `also` has other forms by name.
+    """
+    whole, first = float(current.errors.sum()), float(tried[0].errors.sum())
+    left = [float(r.errors.sum()) for r in tried[:CONTENDERS]]
+    contend = [at for at, errors in enumerate(left) if whole - errors > 0.5 * (whole - first)]
+    near = [at for at in contend if left[at] < FAR * first]
+    for group in near, contend[len(near) :]:
+        forms = [(at, form) for at in group for form in (tried[at], *also.get(last(tried[at]), []))]
+        settled = shared(lambda form: _well_settled(stage, motion, form[1]), forms)
+        for at in group:
+            own = [found for (of, _), found in zip(forms, settled, strict=True) if of == at]
+            tried[at] = min(own, key=lambda found: float(found.errors.sum()))
+        if float(tried[0].errors.sum()) < NOTHING * whole:
+            break
+
+
 def _below_a_count(entry: Entry, stage: Stage) -> bool:
     """Tell whether an entry is a jump of less than a count of the sensor: what is lost are whole counts."""
     if entry["name"] != "sensor-jump":
@@ -168,14 +192,15 @@ def settle(
     beside = (around * f for f in (0.8, 0.9, 1.0, 1.12, 1.25))
     # Where a recording says nothing of reaches, they would go further every time.
     near = tuple(sorted({1.0, *(min(max(scale, SCALES[0]), SCALES[-1]) for scale in beside)}))
-    base = fit_base(stage, motion, scales=scales or near, effects=effects)
+    memory = refined.fitted.ledger.memory
+    base = fit_base(stage, motion, effects, scales or near, memory)
     found = refine(base, motion, refined.entries)
     for _ in range(AGREE):
         if _agrees(found):
             break
         # Sizes refined on friction that is not the one found beside them hold for neither.
         effects = [effect_of(e) for e in found.entries]
-        base = fit_base(stage, motion, scales=(found.fitted.scale,), effects=effects)
+        base = fit_base(stage, motion, effects, (found.fitted.scale,), memory)
         found = refine(base, motion, found.entries, tries=4)
     return found
 

@@ -9,8 +9,10 @@ import numpy as np
 
 from rtcomp import physics
 from rtcomp.diagnosis.blocks import Bounds
+from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.ledger import BIASES, WHOLE, Ledger, System, grid_of
 from rtcomp.diagnosis.motion import Motion
+from rtcomp.diagnosis.remembered import Memory
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect
 from rtcomp.stage.stage import Stage
@@ -79,16 +81,21 @@ def fit_base(
     motion: Motion,
     effects: list[Effect] | None = None,
     scales: tuple[float, ...] = SCALES,
+    memory: Memory | None = None,
 ) -> Fitted:
-    """Refit the believed stage, with `effects` at work, on the grid of reaches that predicts best."""
-    best: Fitted | None = None
+    """Refit the believed stage, with `effects` at work, on the grid of reaches that predicts best.
+
+    `memory` is that of another ledger of this stage and motion.
+    """
+    memory = memory or Memory()
     given = list(effects or [])
     names = [e.name for e in given]
     at_work_too = [companion.name for e in given for companion in e.companions()]
     whole, play = any(name in WHOLE for name in (*names, *at_work_too)), "backlash" in names
     known = [e for e in map(physics.build, stage.mechanics.effects) if e.place is not physics.Place.DRIVE]
-    for scale in scales:
-        ledger = Ledger(stage, motion, grid_of(stage, scale), known)
+
+    def at_scale(scale: float) -> Fitted:
+        ledger = Ledger(stage, motion, grid_of(stage, scale), known, memory)
         # What asks for the whole of friction is given first the fit without it, then the one with it; what
         # hangs behind a play first the believed friction, then the one found with it.
         for at_work in [[], given, given] if whole else [given, given] if play else [given]:
@@ -97,8 +104,6 @@ def fit_base(
             found = system.blocks.coefficients(ledger.seen, bounds)
             ledger.weigh(found[FIXED : FIXED + ledger.reaches.size])
             ledger.found_with_play = play and bool(at_work)
-        errors = system.blocks.left_out(ledger.seen, bounds)
-        if best is None or errors.sum() < best.errors.sum():
-            best = Fitted(ledger, system, bounds, errors, scale)
-    assert best is not None
-    return best
+        return Fitted(ledger, system, bounds, system.blocks.left_out(ledger.seen, bounds), scale)
+
+    return min(shared(at_scale, scales), key=lambda fitted: float(fitted.errors.sum()))

@@ -14,6 +14,7 @@ import numpy as np
 from rtcomp.diagnosis.base import BELIEVED, FIXED, Fitted, fit_base
 from rtcomp.diagnosis.blocks import Blocks
 from rtcomp.diagnosis.candidates import effect_of
+from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.departure import USUAL
 from rtcomp.diagnosis.extend import level_and_reach
 from rtcomp.diagnosis.motion import Motion
@@ -38,11 +39,13 @@ FREEDOM, WIDE = 9, 2.262
 def neighbours(stage: Stage, motion: Motion, refined: Refined) -> list[Refined]:
     """Return the same entries refined on the grids of reaches beside the one that fits best."""
     effects = [effect_of(e) for e in refined.entries]
-    found = []
-    for factor in BESIDE:
-        base = fit_base(stage, motion, scales=(refined.fitted.scale * factor,), effects=effects)
-        found.append(refine(base, motion, refined.entries, tries=3))
-    return found
+    fitted = refined.fitted
+
+    def beside(factor: float) -> Refined:
+        base = fit_base(stage, motion, effects, (fitted.scale * factor,), fitted.ledger.memory)
+        return refine(base, motion, refined.entries, tries=3)
+
+    return shared(beside, BESIDE)
 
 
 def birge(final: Fitted, floor: Floats) -> float:

@@ -34,8 +34,10 @@ RIVAL, HALF = 0.7, 0.3
 a free curve,"""
 TOGETHER, SHAPED = 0.6, 0.95
 """and the part of the error with the first and its second that the other and its own must not exceed."""
-RIVALS = 2
-"""Others tried so at the most."""
+RIVALS, HOPELESS = 2, 100.0
+"""Others tried so at the most, and times the error with the first that they may leave alone."""
+DONE = 3.0
+"""Times the floor that two leave, below which no other two are tried."""
 EXCHANGED = 0.93
 """Part of the error with one entry that must be left with another in its place, to take that one."""
 ENOUGH, POOR = 0.7, 0.5
@@ -177,22 +179,39 @@ def _look_ahead(
         if last(r) not in group
         and last(r) not in SHAPELESS
         and float(base.errors.sum() - r.errors.sum()) > (HALF if last(best) in SHAPELESS else RIVAL) * gain
+        and float(r.errors.sum()) < HOPELESS * float(best.errors.sum())
     ]
     if not rivals or not worth_it(base.errors, best.errors, floor):
         return first, None
-    own = None if settled else best_addition(stage, motion, best.fitted, best.entries, progress, without)
-    chosen, ahead = best, own
-    left = float((own.best if own is not None and own.best is not None else best).errors.sum())
+
+    def beside(one: Refined) -> Addition:
+        return best_addition(stage, motion, one.fitted, one.entries, progress, without)
+
+    done = DONE * float(floor.sum())
+    chosen, ahead, left = best, None, float(best.errors.sum())
+    asked = settled
+    if not asked and last(best) not in SHAPELESS:
+        ahead, asked = beside(best), True
+        left = float((ahead.best or best).errors.sum())
     for rival in rivals[:RIVALS]:
-        other = best_addition(stage, motion, rival.fitted, rival.entries, progress, without)
+        if asked and left < done and last(chosen) not in SHAPELESS:
+            break
+        other = beside(rival)
         both = other.best
         if both is None or not worth_it(base.errors, both.errors, floor):
             continue
         alone = modelled([last(rival)], [float(base.errors.sum() - rival.errors.sum())])
         if not settles_the_rest(alone, rival.errors, both.errors, floor):
             continue
-        if float(both.errors.sum()) < _most_left(last(chosen), last(both), left, enough):
-            chosen, ahead, left = rival, other, float(both.errors.sum())
+        pair = float(both.errors.sum())
+        if not asked and not (pair < done and last(both) not in SHAPELESS):
+            # A free curve and what goes with it are asked for only where nothing with a name does for both.
+            ahead, asked = beside(best), True
+            left = float((ahead.best or best).errors.sum())
+        if pair < _most_left(last(chosen), last(both), left, enough if asked else done):
+            chosen, ahead, left, asked = rival, other, pair, True
+    if not asked:
+        ahead = beside(best)
     others = [best, *(r for r in first.others if r is not chosen)] if chosen is not best else first.others
     return replace(first, best=chosen, others=others), ahead
 
@@ -216,7 +235,10 @@ def _exchange(
     without: frozenset[str],
 ) -> Refined:
     """Look for each entry again with the others at work: what was named first had to do for them as well."""
+    as_found = True
     for at in range(len(choices)):
+        if as_found and at == len(choices) - 1:
+            break  # it was found beside these others
         others = [e for i, e in enumerate(refined.entries) if i != at]
         fewer = settle(stage, motion, refine(refined.fitted, motion, others, tries=3))
         added = best_addition(stage, motion, fewer.fitted, fewer.entries, progress, without)
@@ -235,6 +257,7 @@ def _exchange(
         names, probability = alike(best, added.others, fewer.fitted, floor)
         gained = float(fewer.errors.sum() - best.errors.sum())
         if not same or float(best.errors.sum()) < float(refined.errors.sum()):
+            as_found &= same and float(best.errors.sum()) > EXCHANGED * float(refined.errors.sum())
             refined = refine(best.fitted, motion, _moved(best.entries, at), tries=1)
         own = str(refined.entries[at]["name"])
         choices[at] = Choice([own, *(name for name in names if name != own)], probability, gained)

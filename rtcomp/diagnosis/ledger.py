@@ -10,7 +10,7 @@ force adds a column, what changes the drive changes the left side, what changes 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +19,7 @@ from rtcomp.diagnosis.bank import units_along
 from rtcomp.diagnosis.blocks import Blocks
 from rtcomp.diagnosis.motion import BLOCKS, Motion, Strip
 from rtcomp.diagnosis.path import Load, behind_play, derivatives, kinematics
+from rtcomp.diagnosis.remembered import Memory
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place
 from rtcomp.physics.closing import ClosingBranches
@@ -30,10 +31,6 @@ MASS, VISCOUS, MICRO, BIAS = "mass", "viscous", "micro_damping", "bias"
 BIASES = ("constant-force", "gravity", "drive-offset")
 GRID = 14
 """Reaches of the grid where the believed friction is not a short list of elements."""
-
-
-REMEMBERED, REMEMBERED_DRIVES = 24, 4
-"""Tables of friction kept at a time, those of the entries that are refined together, and forces of drives."""
 
 
 WHOLE = ("load-dependent-friction", "creep", "non-congruent-friction", ClosingBranches.name)
@@ -59,6 +56,8 @@ class Ledger:
     reaches: Floats
     known: list[Effect] = field(default_factory=list)
     """Effects of the believed stage beside its base."""
+    memory: Memory = field(default_factory=Memory)
+    """What ledgers of this stage and motion share."""
 
     def __post_init__(self) -> None:
         self.block = self.motion.block()
@@ -70,10 +69,6 @@ class Ledger:
         self.found_with_play = False
         """Whether the weights are those found with a play at work: then its load carries that friction."""
         self._plain: System | None = None
-        self._paths: tuple[object, list[tuple[Floats, Floats, Floats]]] = (None, [])
-        self._frictions: dict[object, Floats] = {}
-        self._drives: dict[object, list[Floats]] = {}
-        self._loads: tuple[object, list[Floats]] = (None, [])
 
     def weigh(self, weights: Floats) -> None:
         """Take `weights` (N/m) of the stop elements for the friction at hand, where effects ask for it."""
@@ -156,20 +151,18 @@ class Ledger:
         return System(y, table, names, Blocks.of(table, y, self.block, BLOCKS))
 
     def _kinematics(self, sensors: Sequence[Effect]) -> list[tuple[Floats, Floats, Floats]]:
-        """Return true position, velocity and acceleration of each strip; remembers the last ones."""
-        key = _key(sensors)
-        if self._paths[0] != key:
-            found = [kinematics(strip, self.motion, sensors) for strip in self.motion.strips]
-            self._paths = key, found
-        return self._paths[1]
+        """Return true position, velocity and acceleration of each strip."""
+        return self.memory.paths.of(
+            _key(sensors), lambda: [kinematics(strip, self.motion, sensors) for strip in self.motion.strips]
+        )
 
     def _behind(self, sensors: Sequence[Effect], play: Effect) -> list[Floats]:
-        """Return the position (m) of the load behind a play along each strip; remembers the last ones."""
-        key = (_key(sensors), _key([play]), self.found_with_play and self.weights.tobytes())
-        if self._loads[0] != key:
-            paths = self._kinematics(sensors)
-            self._loads = key, [self._drawn(x, play) for x, _, _ in paths]
-        return self._loads[1]
+        """Return the position (m) of the load behind a play along each strip."""
+        own = self.found_with_play and (self.weights.tobytes(), self.reaches.tobytes())
+        return self.memory.loads.of(
+            (_key(sensors), _key([play]), own),
+            lambda: [self._drawn(x, play) for x, _, _ in self._kinematics(sensors)],
+        )
 
     def _drawn(self, x: Floats, play: Effect) -> Floats:
         m, friction = self.stage.mechanics, self.stage.friction
@@ -189,39 +182,43 @@ class Ledger:
         sensors: Sequence[Effect],
         play: Effect | None,
     ) -> Floats:
-        """Return the units of friction on the kept rows; remembered by what changes them."""
+        """Return the units of friction on the kept rows."""
         weighs = play is not None or any(e.name in WHOLE for e in modifiers)
-        plays = _key([] if play is None else [play])
-        key = (_key(before), _key(modifiers), _key(sensors), plays, weighs and self.weights.tobytes())
-        if key not in self._frictions:
-            rows = []
-            for i, (strip, (x, v, a)) in enumerate(
-                zip(self.motion.strips, self._kinematics(sensors), strict=True)
-            ):
-                if play is not None:
-                    x = self._behind(sensors, play)[i]
-                    v, a = derivatives(x, self.motion.period)
-                held = np.append(strip.voltage[:1], strip.voltage[:-1])
-                motion = np.column_stack([strip.time, x, v, a, held])
-                found = units_along(
-                    self.stage, before, modifiers, self.reaches, self.weights, motion, self.grain
-                )
-                rows.append(found)
-            if len(self._frictions) >= REMEMBERED:
-                self._frictions.pop(next(iter(self._frictions)))
-            self._frictions[key] = self.motion.smooth(rows)
-        return self._frictions[key]
+        behind = play is not None and (_key([play]), self.found_with_play)
+        own = self.reaches.tobytes(), weighs and self.weights.tobytes()
+        return self.memory.frictions.of(
+            (_key(before), _key(modifiers), _key(sensors), behind, own),
+            lambda: self._units(before, modifiers, sensors, play),
+        )
+
+    def _units(
+        self,
+        before: Sequence[Effect],
+        modifiers: Sequence[Effect],
+        sensors: Sequence[Effect],
+        play: Effect | None,
+    ) -> Floats:
+        rows = []
+        for i, (strip, (x, v, a)) in enumerate(
+            zip(self.motion.strips, self._kinematics(sensors), strict=True)
+        ):
+            if play is not None:
+                x = self._behind(sensors, play)[i]
+                v, a = derivatives(x, self.motion.period)
+            held = np.append(strip.voltage[:1], strip.voltage[:-1])
+            motion = np.column_stack([strip.time, x, v, a, held])
+            found = units_along(self.stage, before, modifiers, self.reaches, self.weights, motion, self.grain)
+            rows.append(found)
+        return self.motion.smooth(rows)
 
     def _driven(self, drive: Sequence[Effect], sensors: Sequence[Effect]) -> list[Floats]:
-        """Return the force of the drive (N) around the rows of each strip; remembered by what changes it."""
-        key = (_key(drive), _key(sensors))
-        if key not in self._drives:
+        """Return the force of the drive (N) around the rows of each strip."""
+
+        def found() -> list[Floats]:
             paths = zip(self.motion.strips, self._kinematics(sensors), strict=True)
-            found = [self._given(strip, drive, *path) for strip, path in paths]
-            if len(self._drives) >= REMEMBERED_DRIVES:
-                self._drives.pop(next(iter(self._drives)))
-            self._drives[key] = found
-        return self._drives[key]
+            return [self._given(strip, drive, *path) for strip, path in paths]
+
+        return self.memory.drives.of((_key(drive), _key(sensors)), found)
 
     def _given(self, strip: Strip, drive: Sequence[Effect], x: Floats, v: Floats, a: Floats) -> Floats:
         chain = sorted([*self._drive(), *drive], key=lambda e: e.order)
@@ -236,7 +233,7 @@ class Ledger:
         return [e for e in chain if not any(e is k for k in self.known)]
 
 
-def _key(effects: Sequence[Effect]) -> object:
+def _key(effects: Sequence[Effect]) -> Hashable:
     return tuple(repr(e.to_dict()) for e in effects)
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from rtcomp.diagnosis.base import FIXED, Fitted, bounds_of
 from rtcomp.diagnosis.candidates import effect_of
+from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.departure import off
 from rtcomp.diagnosis.ledger import Ledger, System
 from rtcomp.diagnosis.motion import Motion
@@ -189,20 +191,16 @@ def refine(
     for _ in range(tries):
         # Just enough to hold what the recording does not tell.
         weight = BELIEF * float(residual @ residual)
-        for j, knob in enumerate(knobs):
-            jacobian[:, j] = away[:, j] = 0.0
-            scales = current[knob.entry]["name"] in SCALING
-            for way in (1.0, -1.0) if scales else (1.0,):
-                one = np.zeros(len(knobs))
-                one[j] = way
-                try:
-                    other, left = evaluate(base, at(current, knobs, one))
-                except ConfigError:
-                    continue
-                slope = way * (left - residual)
-                # Where a believed number is at its bound, only one way is told by the recording.
-                if way > 0 or slope @ slope < 0.25 * float(jacobian[:, j] @ jacobian[:, j]):
-                    jacobian[:, j], away[:, j] = slope, way * (off(other) - belief)
+        turns = [(j, way) for j, knob in enumerate(knobs) for way in _ways(current[knob.entry])]
+        turned = shared(partial(_turned, base, current, knobs), turns)
+        jacobian[:] = away[:] = 0.0
+        for (j, way), other in zip(turns, turned, strict=True):
+            if other is None:
+                continue
+            slope = way * (other[1] - residual)
+            # Where a believed number is at its bound, only one way is told by the recording.
+            if way > 0 or slope @ slope < 0.25 * float(jacobian[:, j] @ jacobian[:, j]):
+                jacobian[:, j], away[:, j] = slope, way * (off(other[0]) - belief)
         gram = jacobian.T @ jacobian + weight * away.T @ away
         slope = jacobian.T @ residual + weight * away.T @ belief
         before = float(residual @ residual + weight * belief @ belief)
@@ -232,3 +230,20 @@ def refine(
         if gained < SETTLED and float(np.max(np.abs(move))) < 1.0:
             break
     return Refined(current, fitted, knobs, jacobian, residual, away)
+
+
+def _ways(entry: Entry) -> tuple[float, ...]:
+    """Return the directions in which derivatives with respect to an entry's knobs are taken."""
+    return (1.0, -1.0) if entry["name"] in SCALING else (1.0,)
+
+
+def _turned(
+    base: Fitted, entries: Sequence[Entry], knobs: Sequence[Knob], turn: tuple[int, float]
+) -> tuple[Fitted, Floats] | None:
+    """Evaluate with one knob a step up or down (`turn`: which, and the way); None where that cannot be."""
+    one = np.zeros(len(knobs))
+    one[turn[0]] = turn[1]
+    try:
+        return evaluate(base, at(entries, knobs, one))
+    except ConfigError:
+        return None

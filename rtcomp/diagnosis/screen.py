@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rtcomp.diagnosis.base import Fitted, fit_base
 from rtcomp.diagnosis.candidates import effect_of, searches
+from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.ledger import WHOLE, Ledger, System
 from rtcomp.diagnosis.scene import Column, Entry, Point, Scene
 from rtcomp.diagnosis.search_at_work import at_work
@@ -56,47 +57,44 @@ def screen(
 ) -> list[Screened]:
     """Try everything beside `effects`; return the best point of each name, the most explaining first."""
     fitted = scene.fitted
-    ledger, seen = fitted.ledger, fitted.ledger.seen
     # An entry that shrinks the drive side shrinks every error; all are stated for the believed drive.
-    power = float(fitted.system.blocks.power[seen].sum())
+    power = float(fitted.system.blocks.power[fitted.ledger.seen].sum())
     best: dict[tuple[object, ...], Screened] = {}
     others = [effect_of(e) for e in effects]
-    all_searches = list(searches(scene))
-    for number, search in enumerate(all_searches):
-        if isinstance(search, Column):
-            columns = search.columns()
-            more = np.column_stack(columns)
-            system = ledger.extended(fitted.system, [search.name] * len(columns), more)
-            bounds = fitted.bounds.with_free(len(columns))
-            errors = system.blocks.left_out(seen, bounds)
-            found = system.blocks.coefficients(seen, bounds)[-len(columns) :]
-            entry = search.compose(found)
-        else:
-            assert isinstance(search, Point)
-            entry = search.entry
-            try:
-                system = ledger.system([*others, effect_of(entry)])
-            except ConfigError:
-                continue
-            scale = power / max(float(system.blocks.power[seen].sum()), 1e-300)
-            errors = system.blocks.left_out(seen, fitted.bounds) * scale
-            if errors.sum() > NO_GAIN * fitted.errors.sum() and search.name in SIZES:
-                smaller = _smaller(fitted, system, search)
-                if smaller is not None:
-                    entry, errors = smaller
-        if not np.isfinite(errors).all():
-            continue
-        _keep(best, Screened(search.name, entry, errors))
-        if progress is not None:
-            progress((number + 1) / len(all_searches))
-    for one in _as_believed(scene, others, power):
-        _keep(best, one)
+    at_hand = shared(lambda search: _tried(fitted, others, power, search), searches(scene), progress)
+    for one in (*at_hand, *_as_believed(scene, others, power)):
+        if one is not None:
+            _keep(best, one)
     first: dict[str, Screened] = {}
     for one in sorted(best.values(), key=lambda b: float(b.errors.sum())):
         known = first.setdefault(one.name, one)
         if known is not one:
             first[one.name] = replace(known, forms=(*known.forms, one))
     return list(first.values())
+
+
+def _tried(fitted: Fitted, others: list[Effect], power: float, search: Column | Point) -> Screened | None:
+    """Try one search beside `others`; None where it cannot be evaluated."""
+    ledger, seen = fitted.ledger, fitted.ledger.seen
+    if isinstance(search, Column):
+        columns = search.columns()
+        system = ledger.extended(fitted.system, [search.name] * len(columns), np.column_stack(columns))
+        bounds = fitted.bounds.with_free(len(columns))
+        errors = system.blocks.left_out(seen, bounds)
+        entry = search.compose(system.blocks.coefficients(seen, bounds)[-len(columns) :])
+    else:
+        entry = search.entry
+        try:
+            system = ledger.system([*others, effect_of(entry)])
+        except ConfigError:
+            return None
+        scale = power / max(float(system.blocks.power[seen].sum()), 1e-300)
+        errors = system.blocks.left_out(seen, fitted.bounds) * scale
+        if errors.sum() > NO_GAIN * fitted.errors.sum() and search.name in SIZES:
+            smaller = _smaller(fitted, system, search)
+            if smaller is not None:
+                entry, errors = smaller
+    return Screened(search.name, entry, errors) if np.isfinite(errors).all() else None
 
 
 def _keep(best: dict[tuple[object, ...], Screened], one: Screened) -> None:
@@ -106,20 +104,24 @@ def _keep(best: dict[tuple[object, ...], Screened], one: Screened) -> None:
         best[key] = one
 
 
-def _as_believed(scene: Scene, others: list[Effect], power: float) -> Iterator[Screened]:
+def _as_believed(scene: Scene, others: list[Effect], power: float) -> list[Screened | None]:
     """Try what other reaches do much of on the believed ones, where those of the base have gone elsewhere."""
     ledger = scene.fitted.ledger
     if 1.0 / BENT < scene.fitted.scale < BENT:
-        return
-    for point in at_work(scene):
-        if point.name in WHOLE or _small_play(point.entry, ledger):
-            try:
-                own = fit_base(ledger.stage, scene.motion, [*others, effect_of(point.entry)], (1.0,))
-            except ConfigError:
-                continue
-            scale = power / max(float(own.system.blocks.power[ledger.seen].sum()), 1e-300)
-            if np.isfinite(own.errors).all():
-                yield Screened(point.name, point.entry, own.errors * scale, ground=own)
+        return []
+
+    def tried(point: Point) -> Screened | None:
+        at_work_too = [*others, effect_of(point.entry)]
+        try:
+            own = fit_base(ledger.stage, scene.motion, at_work_too, (1.0,), ledger.memory)
+        except ConfigError:
+            return None
+        scale = power / max(float(own.system.blocks.power[ledger.seen].sum()), 1e-300)
+        if not np.isfinite(own.errors).all():
+            return None
+        return Screened(point.name, point.entry, own.errors * scale, ground=own)
+
+    return shared(tried, (p for p in at_work(scene) if p.name in WHOLE or _small_play(p.entry, ledger)))
 
 
 def _smaller(fitted: Fitted, system: System, tried: Point) -> tuple[Entry, Floats] | None:

@@ -218,7 +218,8 @@ class Recorder:
                 status = self._process.wait()
         for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
             if pipe is not None:
-                pipe.close()
+                with contextlib.suppress(BrokenPipeError):  # what a dead recorder was told last
+                    pipe.close()
         return status
 
 

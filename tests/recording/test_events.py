@@ -75,6 +75,7 @@ def test_after_a_kill_of_the_recorder_they_are_there_up_to_the_last_flush(tmp_pa
         assert time.monotonic() < end
         time.sleep(0.01)
     os.kill(recorder.pid, signal.SIGKILL)
+    os.waitid(os.P_PID, recorder.pid, os.WEXITED | os.WNOWAIT)  # dead, and not yet asked for
     recorder.tell(1.0, State.FAULT, "nobody hears this")
     ring.close(2)
     assert recorder.finish().problem

@@ -1,0 +1,89 @@
+"""Work shared among the processor's cores: kernels run without Python's lock, so threads do.
+
+Whoever calls `shared` works too and takes an idle helper along where there is one; a helper that calls it
+finds none idle and goes on alone. So every level of a search may ask, the outermost gets the cores, and an
+inner one those that the outer leaves idle.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cache
+from typing import TypeVar
+
+from numba import config
+
+Item = TypeVar("Item")
+Found = TypeVar("Found")
+
+
+class _Helpers:
+    """Threads for all cores but the caller's, and how many of them are idle."""
+
+    def __init__(self, count: int) -> None:
+        self.idle = threading.Semaphore(count)
+        self.pool = ThreadPoolExecutor(max(count, 1), thread_name_prefix="rtcomp-diagnosis")
+
+
+@cache
+def _helpers() -> _Helpers:
+    # As many as numba would use: the cores that this process may run on, or NUMBA_NUM_THREADS.
+    return _Helpers(int(config.NUMBA_NUM_THREADS) - 1)
+
+
+def shared(
+    function: Callable[[Item], Found], items: Iterable[Item], done: Callable[[float], None] | None = None
+) -> list[Found]:
+    """Return ``[function(i) for i in items]``, worked out on all cores that are idle.
+
+    `function` must be pure, or change nothing but what it remembers. `done` hears the part that is done,
+    always in the calling thread. The first exception is raised, by the order of the items.
+    """
+    all_items = list(items)
+    found: dict[int, Found] = {}
+    failed: dict[int, BaseException] = {}
+    left = iter(enumerate(all_items))
+    lock = threading.Lock()
+    helpers = _helpers()
+
+    def work(say: Callable[[float], None] | None) -> None:
+        for at, item in _taken(left, lock):
+            try:
+                found[at] = function(item)
+            except BaseException as error:  # raised below, in the calling thread
+                failed[at] = error
+                with lock:
+                    for _ in left:  # nobody needs the others any more
+                        pass
+            if say is not None:
+                say((len(found) + len(failed)) / len(all_items))
+
+    def help_out() -> None:
+        try:
+            work(None)
+        finally:
+            helpers.idle.release()
+
+    at_work: list[Future[None]] = []
+    while len(at_work) < len(all_items) - 1 and helpers.idle.acquire(blocking=False):
+        at_work.append(helpers.pool.submit(help_out))
+    try:
+        work(done)
+    finally:
+        for helper in at_work:
+            helper.result()
+    if failed:
+        raise failed[min(failed)]
+    return [found[at] for at in range(len(all_items))]
+
+
+def _taken(left: Iterator[Item], lock: threading.Lock) -> Iterator[Item]:
+    """Take one after the other from what is left, whoever else does so too."""
+    while True:
+        with lock:
+            item = next(left, None)
+        if item is None:
+            return
+        yield item
