@@ -33,7 +33,9 @@ NEARLY = 0.93
 BESIDE = {"backlash": "resonance", "resonance": "backlash"}
 """Entries not looked for beside each other: a play has a contact that rings, a second mass goes loose."""
 
-UNDECIDED = {"asymmetric-friction": "closing", "load-dependent-friction": "following"}
+UNDECIDED = {
+    "asymmetric-friction": "closing", "cogging": "harmonics", "load-dependent-friction": "following",
+}  # fmt: skip
 """Entries whose forms, by this parameter, only a settled fit tells apart: one asks for the whole of friction,
 of which the base that has bent to the effect gives a wrong picture."""
 AGAIN, GAINS = 2, 0.05
@@ -126,12 +128,14 @@ def _quickly(current: Fitted, motion: Motion, entries: list[Entry], screened: Sc
     for variant, ground in [*variants, *((form.entry, form.ground) for form in screened.forms)]:
         try:
             made = [*entries, variant]
-            tried = refine(ground or current, motion, made, which=[len(entries)], tries=QUICK)
+            # On another ground than the one that they were found on, those at work are others too.
+            which = None if ground else [len(entries)]
+            tried = refine(ground or current, motion, made, which, QUICK)
         except (ConfigError, np.linalg.LinAlgError):
             continue
         if not _below_a_count(tried.entries[-1], current.ledger.stage):
             found.append(tried)
-    found.sort(key=lambda r: float(r.errors.sum()) * _handicap(r.entries[-1]))
+    found.sort(key=_weighed)
     kind = UNDECIDED.get(screened.name)
     others = [r for r in found if kind and r.entries[-1].get(kind) != found[0].entries[-1].get(kind)]
     return [*found[:1], *others[:1]]
@@ -153,7 +157,7 @@ def _settle_contenders(
         settled = shared(lambda form: _well_settled(stage, motion, form[1]), forms)
         for at in group:
             own = [found for (of, _), found in zip(forms, settled, strict=True) if of == at]
-            tried[at] = min(own, key=lambda found: float(found.errors.sum()))
+            tried[at] = min(own, key=_weighed)
         if float(tried[0].errors.sum()) < NOTHING * whole:
             break
 
@@ -165,9 +169,9 @@ def _below_a_count(entry: Entry, stage: Stage) -> bool:
     return abs(float(entry["size"])) < stage.sensor.resolution  # type: ignore[arg-type]
 
 
-def _handicap(entry: Entry) -> float:
-    """Return by how much a form must do better than another to be taken: what has more to it, by a tenth."""
-    return 1.1 if "harmonics" in entry else 1.0
+def _weighed(form: Refined) -> float:
+    """Return the error by which forms are compared: what has more to it must do a tenth better."""
+    return float(form.errors.sum()) * (1.1 if "harmonics" in form.entries[-1] else 1.0)
 
 
 def _well_settled(stage: Stage, motion: Motion, refined: Refined) -> Refined:

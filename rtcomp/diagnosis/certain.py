@@ -112,7 +112,7 @@ def scatter(without: Floats) -> Floats:
 def intervals(
     refined: Refined, beside: Sequence[Refined], worse: float = 1.0
 ) -> dict[tuple[int, str], tuple[float, float]]:
-    """Return the 95 % interval of every knob, by entry number and name; `worse` widens them (`birge`)."""
+    """Return the 95 % interval of each parameter, by entry number and name, widened by `worse` (`birge`)."""
     from scipy.stats import t as student
 
     ledger = refined.fitted.ledger
@@ -124,10 +124,12 @@ def intervals(
     spread = covariance(refined)
     factor = float(student.ppf(0.975, max(int(ledger.seen.sum()) - 1, 1)))
     for k, knob in enumerate(refined.knobs):
-        value = _value(refined, knob)
+        if knob.item is not None:
+            continue  # told with the entry, without an interval of its own
+        value = knob.of(refined.entries)
         sd = float(np.sqrt(max(spread[k, k], 0.0)))
         grid = max(
-            (_weight(refined.fitted, b.fitted) * _apart(knob, _value(b, knob), value) for b in beside),
+            (_weight(refined.fitted, b.fitted) * _apart(knob, knob.of(b.entries), value) for b in beside),
             default=0.0,
         )
         size = 2.0 if knob.parameter.name == "phase" else abs(value)
@@ -135,10 +137,6 @@ def intervals(
         low, high = knob.parameter.low, knob.parameter.high  # what it may be at all
         found[knob.entry, knob.parameter.name] = (max(value - half, low), min(value + half, high))
     return found
-
-
-def _value(refined: Refined, knob: Knob) -> float:
-    return float(refined.entries[knob.entry][knob.parameter.name])  # type: ignore[arg-type]
 
 
 def _apart(knob: Knob, one: float, other: float) -> float:
@@ -219,7 +217,7 @@ def _pulled(believed: Stage, refined: Refined, values: Floats) -> Floats:
     for k, knob in enumerate(refined.knobs):
         name = refined.entries[knob.entry]["name"]
         if name == "inertia":
-            pulled[0, k] += values[0] * knob.step / _value(refined, knob)
+            pulled[0, k] += values[0] * knob.step / knob.of(refined.entries)
         elif name == "viscous-friction" and believed.mechanics.viscous > 0:
             pulled[1, k] += knob.step
     return pulled

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from rtcomp.diagnosis.accept import (
     ABOVE_FLOOR,
     NEAR,
@@ -36,6 +38,9 @@ TOGETHER, SHAPED = 0.6, 0.95
 """and the part of the error with the first and its second that the other and its own must not exceed."""
 RIVALS, HOPELESS = 2, 100.0
 """Others tried so at the most, and times the error with the first that they may leave alone."""
+ONCE = 4.0
+"""Times the floor of its stretch that is left where the sensor may have jumped, from which on it is looked
+into."""
 DONE = 3.0
 """Times the floor that two leave, below which no other two are tried."""
 EXCHANGED = 0.93
@@ -111,10 +116,11 @@ def decide(
     ahead: Addition | None = None
     greedy: Refined | None = None
     for step in range(MOST):
-        if current.errors.sum() < ABOVE_FLOOR * floor.sum() and not (looked_at and not entries):
+        once = _once(motion, current, floor)
+        if current.errors.sum() < ABOVE_FLOOR * floor.sum() and not (looked_at and not entries) and not once:
             break
         explained = modelled((str(e["name"]) for e in entries), (c.gain for c in choices))
-        if entries and current.errors.sum() - floor.sum() < SETTLED * explained:
+        if entries and current.errors.sum() - floor.sum() < SETTLED * explained and not once:
             break
         added = ahead or best_addition(stage, motion, current, entries, part_of(step), without)
         ahead = None
@@ -152,6 +158,13 @@ def decide(
     return decision
 
 
+def _once(motion: Motion, current: Fitted, floor: Floats) -> bool:
+    """Tell whether a stretch in which the sensor may have jumped is far off, whatever all are together."""
+    seen = np.flatnonzero(current.ledger.seen)
+    far = current.errors > ONCE * np.maximum(floor, floor.mean())
+    return bool(far[np.isin(seen, list(motion.jumped))].any())
+
+
 def _look_ahead(
     stage: Stage,
     motion: Motion,
@@ -173,13 +186,14 @@ def _look_ahead(
         return first, None
     gain = float(base.errors.sum() - best.errors.sum())
     group = next((set(g) for g in ONE_THING if last(best) in g), {last(best)})
+    shapeless = last(best) in SHAPELESS
+    most = (1.0 - (HALF if shapeless else RIVAL)) * gain + float(best.errors.sum())
+    if not shapeless:
+        most = min(most, HOPELESS * float(best.errors.sum()))
     rivals = [
         r
         for r in first.others
-        if last(r) not in group
-        and last(r) not in SHAPELESS
-        and float(base.errors.sum() - r.errors.sum()) > (HALF if last(best) in SHAPELESS else RIVAL) * gain
-        and float(r.errors.sum()) < HOPELESS * float(best.errors.sum())
+        if last(r) not in group and last(r) not in SHAPELESS and float(r.errors.sum()) < most
     ]
     if not rivals or not worth_it(base.errors, best.errors, floor):
         return first, None
@@ -190,7 +204,7 @@ def _look_ahead(
     done = DONE * float(floor.sum())
     chosen, ahead, left = best, None, float(best.errors.sum())
     asked = settled
-    if not asked and last(best) not in SHAPELESS:
+    if not asked and not shapeless:
         ahead, asked = beside(best), True
         left = float((ahead.best or best).errors.sum())
     for rival in rivals[:RIVALS]:

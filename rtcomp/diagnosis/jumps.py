@@ -8,26 +8,38 @@ from rtcomp.kernels import Floats
 
 MOST = 4
 OUTSTANDING = 6.0
-"""Size of a jump in robust standard deviations of how steps differ from their neighbours."""
+"""Size of a jump in standard deviations of how steps differ from their neighbours, there and in general."""
+AROUND, ITSELF = 25, 3
+"""Rows before and after that say how steps differ there, and those that the jump itself changes."""
 
 
 def jumps(time: Floats, position: Floats) -> list[tuple[float, float]]:
-    """Return times (s) and sizes (m) of the steps between rows that stand out most, the largest first.
+    """Return times (s) and sizes (m) of the steps between rows that stand out most, the clearest first.
 
+    A step is compared with the cubic through the two before and the two after it, which follows what the
+    motion itself does; where it does so badly (contacts, stops) many steps differ, and none stands out.
     The time is half a row before the first reading after the jump.
     """
     step = np.diff(position)
-    if step.size < 9:
+    if step.size < 2 * AROUND:
         return []
-    around = 0.25 * (step[:-4] + step[1:-3] + step[3:-1] + step[4:])
-    off = step[2:-2] - around
-    least = OUTSTANDING * float(np.median(np.abs(off))) / 0.6745
+    between = (4.0 * (step[1:-3] + step[3:-1]) - step[:-4] - step[4:]) / 6.0
+    off = step[2:-2] - between
     size = np.abs(off)
+    general = float(np.median(size)) / 0.6745
+    others = _sum_around(off**2, AROUND) - _sum_around(off**2, ITSELF)
+    there = np.sqrt(np.maximum(others, 0.0) / (2 * (AROUND - ITSELF)))
+    clear = size / np.maximum(np.maximum(there, general), 1e-300)
     found: list[tuple[float, float]] = []
     for _ in range(MOST):
-        at = int(np.argmax(size))
-        if size[at] <= least:
+        at = int(np.argmax(clear))
+        if clear[at] <= OUTSTANDING:
             break
         found.append((float(0.5 * (time[at + 2] + time[at + 3])), float(off[at])))
-        size[max(at - 20, 0) : at + 21] = 0.0
+        clear[max(at - 20, 0) : at + 21] = 0.0
     return found
+
+
+def _sum_around(values: Floats, rows: int) -> Floats:
+    """Return the sum over `rows` before each value, itself, and as many after; fewer at the ends."""
+    return np.convolve(values, np.ones(2 * rows + 1), mode="same")

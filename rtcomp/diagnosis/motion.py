@@ -108,13 +108,18 @@ class Motion:
         return np.arange(count) * BLOCKS // count
 
     @property
+    def jumped(self) -> set[int]:
+        """Blocks in which the sensor may have jumped."""
+        times, block = self.plain([s.time for s in self.strips]), self.block()
+        return {int(block[np.argmin(np.abs(times - at))]) for at, _ in self.jumps}
+
+    @property
     def unseen(self) -> tuple[int, ...]:
         """Return the blocks that are put aside: UNSEEN, but none in which the sensor may have jumped.
 
         What happens once can be learned only where it happens.
         """
-        times, block = self.plain([s.time for s in self.strips]), self.block()
-        full = {int(block[np.argmin(np.abs(times - at))]) for at, _ in self.jumps}
+        full = self.jumped
         chosen: list[int] = []
         for k in UNSEEN:
             free = [b for b in ((k + j) % BLOCKS for j in range(BLOCKS)) if b not in full and b not in chosen]

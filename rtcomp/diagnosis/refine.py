@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -18,10 +19,12 @@ from rtcomp.diagnosis.scene import Entry
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Parameter, catalogue
+from rtcomp.physics.drive import Cogging
 from rtcomp.physics.growing import GROWTH
 
 SCALING = ("drive-gain", "sensor-scale", "inertia")
 """Entries that do what other believed numbers would do together."""
+HARMONICS = Cogging.list_name
 SEARCHED = ("time",)
 """Parameters that the search settles, beside choices: a jump is between two rows."""
 BETWEEN = (0.02, 0.98)
@@ -45,6 +48,20 @@ class Knob:
     step: float
     most: float | None = None
     """Largest value that this recording can tell of; None where the parameter's own range is all."""
+    item: int | None = None
+    """Which of the entry's harmonics it is a parameter of, if of one."""
+
+    def of(self, entries: Sequence[Entry]) -> float:
+        """Return its value in `entries`."""
+        return float(self._holder(entries)[self.parameter.name])  # type: ignore[arg-type]
+
+    def put(self, entries: Sequence[Entry], value: float) -> None:
+        """Give it a value in `entries`."""
+        self._holder(entries)[self.parameter.name] = value
+
+    def _holder(self, entries: Sequence[Entry]) -> Entry:
+        entry = entries[self.entry]
+        return entry if self.item is None else entry[HARMONICS][self.item]  # type: ignore[index]
 
 
 @dataclass(frozen=True)
@@ -100,23 +117,27 @@ def knobs_of(entries: Sequence[Entry], motion: Motion, which: Sequence[int] | No
             if entry["name"] == "load-dependent-friction":
                 most = HEAVY  # more would be a drive that locks itself
             found.append(Knob(i, parameter, step, most))
+        for item, harmonic in enumerate(entry.get(HARMONICS, ())):  # type: ignore[arg-type, var-annotated]
+            size = abs(float(harmonic["amplitude"]))
+            steps = {"amplitude": 0.01 * size, "phase": 0.05 if size else 0.0}
+            found += [Knob(i, p, steps[p.name], None, item) for p in Cogging.element if steps.get(p.name)]
     return found
 
 
 def at(entries: Sequence[Entry], knobs: Sequence[Knob], moved: Floats) -> list[Entry]:
     """Return the entries with every knob moved by so many of its steps, kept in range."""
-    out = [dict(e) for e in entries]
+    out = deepcopy(list(entries))
     for knob, steps in zip(knobs, moved, strict=True):
         p = knob.parameter
-        value = float(out[knob.entry][p.name]) + steps * knob.step  # type: ignore[arg-type]
-        before = float(out[knob.entry][p.name])  # type: ignore[arg-type]
+        before = knob.of(out)
+        value = before + steps * knob.step
         if p.low >= 0.0 and p.name not in ("amplitude",):
             value = max(value, 0.2 * before)  # sizes and times do not change sign
         high = min(p.high, 1e300 if knob.most is None else knob.most)
         low = max(p.low, -1e300)
         if p in GROWTH:
             low, high = BETWEEN  # its ends are the search's, not refined any more
-        out[knob.entry][p.name] = float(np.clip(value, low, high))
+        knob.put(out, float(np.clip(value, low, high)))
     return out
 
 
