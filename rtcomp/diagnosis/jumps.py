@@ -7,7 +7,7 @@ import numpy as np
 from rtcomp.kernels import Floats
 
 MOST = 4
-OUTSTANDING = 6.0
+OUTSTANDING = 5.0
 """Size of a jump in standard deviations of how steps differ from their neighbours, there and in general."""
 AROUND, ITSELF = 25, 3
 """Rows before and after that say how steps differ there, and those that the jump itself changes."""
