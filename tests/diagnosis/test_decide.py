@@ -54,6 +54,23 @@ def test_all_that_is_left_is_no_weight_of_a_free_curve() -> None:
 
 
 @pytest.mark.parametrize(
+    ("part", "blocks", "counts"),
+    [
+        (0.95, BLOCKS, True),  # all of it, in every block
+        (0.7, BLOCKS, False),  # as much as another way of modelling the first would take away
+        (0.95, 10, False),  # in half of the blocks only
+    ],
+)
+def test_next_to_nothing_beside_a_large_effect_is_physics_where_one_entry_explains_all_of_it(
+    part: float, blocks: int, counts: bool
+) -> None:
+    chance = np.random.default_rng(7).uniform(0.98, 1.02, BLOCKS)
+    left, floor = 0.2 * np.geomspace(1.0, 50.0, BLOCKS) / BLOCKS, even(1e-4)
+    after = left * np.where(np.arange(BLOCKS) >= BLOCKS - blocks, 1.0 - part, 1.0) * chance
+    assert settles_the_rest(1e4, left, after, floor) is counts
+
+
+@pytest.mark.parametrize(
     ("part", "blocks", "does"),
     [
         (0.3, BLOCKS, True),  # gone from every block

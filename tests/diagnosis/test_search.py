@@ -91,6 +91,22 @@ def test_a_strong_creep_is_settled_on_the_friction_found_beside_it() -> None:
     assert _agrees(best)
 
 
+def test_harmonics_are_refined_like_all_numbers() -> None:
+    true = {"order": 2.0, "amplitude": 0.1, "phase": 2.0}
+    waves = {"name": "cogging", "amplitude": 0.4, "period": 4e-5, "phase": 0.7}
+    at = scene({**waves, "harmonics": [true]})
+    off = {**waves, "harmonics": [{**true, "amplitude": 0.16, "phase": 1.5}]}
+    refined = refine(at.fitted, at.motion, [off])
+    (found,) = refined.entries[0]["harmonics"]  # type: ignore[misc]
+    assert found["amplitude"] == pytest.approx(0.1, rel=0.05)
+    assert found["phase"] == pytest.approx(2.0, abs=0.05)
+    assert found["order"] == 2.0
+    assert off["harmonics"][0]["amplitude"] == 0.16  # type: ignore[index]
+    told = intervals(refined, [])
+    assert {name for _, name in told} == {"amplitude", "period", "phase"}
+    assert told[0, "amplitude"][0] < 0.4 < told[0, "amplitude"][1]
+
+
 @pytest.mark.parametrize(("counts", "is_none"), [(0.5, True), (-0.5, True), (1.5, False), (-40.0, False)])
 def test_a_jump_is_of_whole_counts(counts: float, is_none: bool) -> None:
     count = stage().sensor.resolution
@@ -116,6 +132,28 @@ def test_cogging_with_a_harmonic_is_cogging_and_no_free_curve() -> None:
     assert [e.names[0] for e in found.effects] == ["cogging"]
     assert found.effects[0].parameters["period"].value == pytest.approx(4e-5, rel=0.02)
     assert found.fit.after < 0.5 * found.fit.retuned
+
+
+@pytest.mark.slow
+def test_drag_beside_cogging_is_no_second_wave() -> None:
+    hidden = [
+        {"name": "cogging", "amplitude": 0.4, "period": 6e-5, "phase": 0.7},
+        {"name": "viscous-friction", "coefficient": 25.0},
+    ]
+    found = diagnose(stage(), [run(stage(effects=hidden), there_and_back(20.0))])
+    assert [e.names for e in found.effects] == [("cogging",)]
+    assert found.effects[0].parameters["period"].value == pytest.approx(6e-5, rel=0.01)
+    assert found.fit.after < 0.1 * found.fit.retuned
+
+
+@pytest.mark.slow
+def test_a_jump_beside_a_lag_is_found_by_the_stretch_that_it_spoils() -> None:
+    hidden = [
+        {"name": "drive-lag", "time_constant": 3e-3},
+        {"name": "sensor-jump", "size": 3e-6, "time": 11.3},
+    ]
+    found = diagnose(stage(), [run(stage(effects=hidden), there_and_back(20.0))])
+    assert sorted(e.names[0] for e in found.effects) == ["drive-lag", "sensor-jump"]
 
 
 @pytest.mark.slow
