@@ -25,9 +25,9 @@ LEAST_SHARE = 0.008
 """Part of the squared error that a search must explain to be short-listed."""
 QUICK, CONTENDERS = 2, 3
 """Steps of refinement for the whole short list, and how many of it are refined to the end."""
-FAR, NOTHING = 3.0, 0.002
+FAR, FURTHER, NOTHING = 3.0, 30.0, 0.002
 """Times the error of the first after those few steps, from which on another is refined to the end only if the
-first leaves more than this part of what there was."""
+first leaves more than this part of what there was: if it is a name, if it is a free curve."""
 NEARLY = 0.93
 """Part of what a shapeless entry explains, from which on a name with a shape of its own is preferred."""
 BESIDE = {"backlash": "resonance", "resonance": "backlash"}
@@ -152,14 +152,17 @@ def _settle_contenders(
     left = [float(r.errors.sum()) for r in tried[:CONTENDERS]]
     contend = [at for at, errors in enumerate(left) if whole - errors > 0.5 * (whole - first)]
     near = [at for at in contend if left[at] < FAR * first]
-    for group in near, contend[len(near) :]:
+    shapeless = last(tried[0]) in SHAPELESS
+    for far in False, True:
+        group = [at for at in contend if (at in near) != far]
         forms = [(at, form) for at in group for form in (tried[at], *also.get(last(tried[at]), []))]
         settled = shared(lambda form: _well_settled(stage, motion, form[1]), forms)
         for at in group:
             own = [found for (of, _), found in zip(forms, settled, strict=True) if of == at]
             tried[at] = min(own, key=_weighed)
+        # A free curve that leaves nothing says nothing against a name, unless that is far behind.
         if float(tried[0].errors.sum()) < NOTHING * whole:
-            break
+            contend = [at for at in contend if shapeless and left[at] < FURTHER * first]
 
 
 def _below_a_count(entry: Entry, stage: Stage) -> bool:
