@@ -87,7 +87,10 @@ class Processes:
 
     def _one(self, task: Task) -> Outcome:
         threads = str(max(1, (os.cpu_count() or 1) // self.jobs))
-        environment = {**os.environ, "OMP_NUM_THREADS": threads, "OPENBLAS_NUM_THREADS": threads}
+        environment = {
+            **os.environ,
+            **{f"{name}_NUM_THREADS": threads for name in ("OMP", "OPENBLAS", "NUMBA")},
+        }
         environment["PYTHONUNBUFFERED"] = "1"  # else an error's line comes before what was printed earlier
         task.log.parent.mkdir(parents=True, exist_ok=True)
         started = time.perf_counter()

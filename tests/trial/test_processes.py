@@ -62,6 +62,16 @@ def test_what_a_diagnosis_started_ends_with_it(seconds: float, tmp_path: Path) -
     assert_gone(pids)
 
 
+def test_diagnoses_side_by_side_share_the_cores(tmp_path: Path) -> None:
+    code = "import os; print(os.environ['NUMBA_NUM_THREADS'], os.environ['OMP_NUM_THREADS'])"
+    cores = os.cpu_count() or 1
+    for jobs in (1, cores, 2 * cores):
+        with Processes(jobs) as processes:
+            (said,) = processes.run([task("says", code, tmp_path)])
+        share = max(1, cores // jobs)
+        assert said.words == f"{share} {share}"
+
+
 def test_an_error_while_they_run_ends_them_all(tmp_path: Path) -> None:
     pids = tmp_path / "pids"
     wait = f"import time, pathlib\nwhile not pathlib.Path({str(pids)!r}).exists(): time.sleep(0.01)"
