@@ -23,10 +23,11 @@ ABOVE_FLOOR = 1.6
 NEAR = 2.5
 """Squared error over the floor's, below which a free curve must stand out: it fits rounding as well."""
 SETTLED = 0.004
-"""Part of what entries explain, below which what is left is usually how their kernels model, not physics."""
+"""Part of what entries explain, below which what is left is how their kernels model, not physics."""
 EXACT = (
-    "back-emf", "asymmetric-viscous-friction", "constant-force", "drive-offset", "gravity", "parallel-spring",
-    "quadratic-drag", "tonal-disturbance", "viscous-friction",
+    "back-emf", "asymmetric-viscous-friction", "constant-force", "drive-deadband", "drive-offset",
+    "drive-saturation", "gravity", "parallel-spring", "quadratic-drag", "tonal-disturbance",
+    "viscous-friction",
 )  # fmt: skip
 """Entries whose kernels leave nothing of what they stand for, however much that is."""
 BESIDE, MORE = 0.15, 0.3
@@ -97,8 +98,7 @@ def settles_the_rest(
     """Tell whether a further entry has a weight of its own, not one that trims how others are modelled.
 
     `named` is what those before it explain (`modelled`). All that they leave is no such weight where the
-    entry is `shapeless`: a free curve trims anything. Next to nothing that they leave is one only where it is
-    all explained, beyond doubt.
+    entry is `shapeless`: a free curve trims anything.
     """
     gained = float(before.sum() - after.sum())
     of_rest = gained / float(max(before.sum() - floor.sum(), 1e-300))
@@ -106,8 +106,6 @@ def settles_the_rest(
     each = before - after
     steady = float(each.mean()) > SURE * float(each.std(ddof=1) / np.sqrt(each.size))
     everywhere = steady and bool(np.mean(each > 0.05 * before) >= 0.9)
-    if float(before.sum() - floor.sum()) < SETTLED * named:
-        return of_rest > ALL and not shapeless and stands_out(before, after)
     return (
         (of_rest > ALL and not shapeless)
         or (beside > BESIDE and of_rest > MORE)

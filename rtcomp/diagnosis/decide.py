@@ -13,6 +13,7 @@ import numpy as np
 from rtcomp.diagnosis.accept import (
     ABOVE_FLOOR,
     NEAR,
+    SETTLED,
     modelled,
     settles_the_rest,
     stands_out,
@@ -119,6 +120,8 @@ def decide(
         if current.errors.sum() < ABOVE_FLOOR * floor.sum() and not (looked_at and not entries) and not once:
             break
         explained = modelled((str(e["name"]) for e in entries), (c.gain for c in choices))
+        if entries and current.errors.sum() - floor.sum() < SETTLED * explained and not once:
+            break
         added = ahead or best_addition(stage, motion, current, entries, part_of(step), without)
         ahead = None
         if step == 0:
