@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from textwrap import wrap
 from types import TracebackType
 from typing import Any
 
@@ -20,6 +21,8 @@ from rtcomp.report.quantities import si, written
 __all__ = ["Progress", "Row", "print_claims", "print_summary", "print_verdicts", "say", "si", "summary_table"]
 
 _PERIOD = 1.0 / 8.0
+_NAMES, _LEAST = 40, 20
+"""Characters of a summary that names may take, and that notes are left where there are as many."""
 
 
 class _Percent(ProgressColumn):
@@ -112,28 +115,37 @@ def say(text: str, *, quiet: bool = False, console: Console | None = None) -> No
         console.print(Text(text), soft_wrap=True)
 
 
-def summary_table(title: str, rows: Sequence[Row | tuple[Any, ...]]) -> Table:
-    """Return the closing table; rows as in the page: name, value, unit, note."""
+def summary_table(title: str, rows: Sequence[Row | tuple[Any, ...]], width: int = 120) -> Table:
+    """Return the closing table of at most `width` characters; rows as in the page: name, value, unit, note."""
     table = Table(
         title=Text(title, style="bold"), title_justify="left", show_header=False, box=box.HORIZONTALS
     )
-    lines = [Row(*row) for row in rows]
-    # Where it is narrow the notes wrap, not the names.
-    table.add_column(overflow="fold", min_width=min(max((len(row.name) for row in lines), default=0), 40))
-    table.add_column(justify="right", style="bold", overflow="fold")
-    noted = any(row.note for row in lines)
-    if noted:
-        table.add_column(style="dim", overflow="fold")
-    for row in lines:
+    lines = [(str(row.name), written(row.value, row.unit), str(row.note)) for row in (Row(*r) for r in rows)]
+    count = 3 if any(note for *_, note in lines) else 2
+    widths = _widths([max((len(line[i]) for line in lines), default=0) for i in range(count)], width)
+    styles: tuple[dict[str, Any], ...] = ({}, {"justify": "right", "style": "bold"}, {"style": "dim"})
+    for style, own in zip(styles, widths, strict=False):
+        table.add_column(overflow="fold", width=own, **style)
+    for line in lines:
         # Text, not markup: a name from a file may hold square brackets.
-        cells = [Text(str(row.name)), Text(written(row.value, row.unit))]
-        table.add_row(*cells, *([Text(str(row.note))] if noted else []))
+        table.add_row(*(Text("\n".join(wrap(cell, own))) for cell, own in zip(line, widths, strict=False)))
     return table
+
+
+def _widths(longest: Sequence[int], room: int) -> list[int]:
+    """Return the widths of the columns: where it is narrow the notes wrap first, then values, names last."""
+    room -= 3 * len(longest) + 1  # edges, padding and what stands between
+    names = min(longest[0], _NAMES, max(room // 2, 1))
+    least = min(longest[-1], _LEAST) if len(longest) > 2 else 0
+    values = min(longest[1], max(room - names - least, (room - names) // 2, 1))
+    rest = max(room - names - values, 1)
+    return [names, values, *(min(one, rest) for one in longest[2:])]
 
 
 def print_summary(title: str, rows: Sequence[Row | tuple[Any, ...]], console: Console | None = None) -> None:
     """Print `summary_table` to standard output."""
-    (console or Console()).print(summary_table(title, rows))
+    console = console or Console()
+    console.print(summary_table(title, rows, console.width))
 
 
 def print_verdicts(

@@ -11,6 +11,8 @@ import time
 from io import StringIO
 
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 from rich.console import Console
 
 from rtcomp.report.terminal import Progress, print_summary, summary_table
@@ -127,3 +129,20 @@ def test_where_it_is_narrow_the_notes_wrap_and_the_names_do_not() -> None:
     print_summary("t", rows, Console(file=out, width=80))
     assert "Live run, before feedforward, rms" in out.getvalue()
     assert max(len(line) for line in out.getvalue().splitlines()) <= 80
+
+
+WORDS = st.lists(st.text("abcdefgh", min_size=1, max_size=9), min_size=1, max_size=8).map(" ".join)
+
+
+@given(st.lists(st.tuples(WORDS, WORDS, st.just(""), st.one_of(st.just(""), WORDS)), min_size=1, max_size=4))
+@example([("Named by the diagnosis", "position-dependent-friction", "", "amplitude 0.39, period 156 um")])
+@example([("Held-out error", "0.599 %", "", "frozen weights, other motion, rms over peak force")])
+@settings(max_examples=60, deadline=None)
+def test_no_word_is_lost_however_narrow(rows: list[tuple[str, str, str, str]]) -> None:
+    for width in (60, 80, 100, 132):
+        out = StringIO()
+        print_summary("t", rows, Console(file=out, width=width))
+        lines = out.getvalue().splitlines()
+        assert max(map(len, lines)) <= width
+        shown = set(out.getvalue().replace("-", " ").split())
+        assert {word for row in rows for cell in row for word in cell.replace("-", " ").split()} <= shown
