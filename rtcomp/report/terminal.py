@@ -116,7 +116,7 @@ def say(text: str, *, quiet: bool = False, console: Console | None = None) -> No
 
 
 def summary_table(title: str, rows: Sequence[Row | tuple[Any, ...]], width: int = 120) -> Table:
-    """Return the closing table of at most `width` characters; rows as in the page: name, value, unit, note."""
+    """Return the closing table, at most `width` characters; rows as in the page: name, value, unit, note."""
     table = Table(
         title=Text(title, style="bold"), title_justify="left", show_header=False, box=box.HORIZONTALS
     )
