@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,9 @@ from rtcomp.kernels import Floats
 
 BINS = 120
 """Points of a curve."""
+IN_TIME = {"friction-drift": True, "sensor-drift": False, "sensor-jump": False}
+"""Entries that are what they are by the time, whatever they go along with besides, and whether the force that
+drifts has the sign of the motion."""
 WAVES = 8
 """Periods of a wave that are drawn, of more in the stroke."""
 
@@ -30,6 +34,8 @@ class Curve(NamedTuple):
     x: Floats
     data: Floats
     curve: Floats
+    signed: bool = False
+    """Whether both forces are given the sign of the motion, as friction has it."""
 
 
 def curves(motion: Motion, final: Fitted, entries: Sequence[Entry], axis: str) -> list[Curve | None]:
@@ -53,8 +59,19 @@ def curves(motion: Motion, final: Fitted, entries: Sequence[Entry], axis: str) -
         if not np.isfinite(force).all() or not np.any(force):
             found.append(None)
             continue
-        found.append(_along(looked, force, without, entry.get("period")))
+        found.append(_along(_own(looked, entry), force, without, entry.get("period")))
     return found
+
+
+def _own(looked: Sequence[Axis], entry: Entry) -> list[Axis]:
+    """Return the axes that an entry may be drawn along: those of its own, where it has such."""
+    if "period" in entry:
+        return [a for a in looked if a.name == "position"]
+    if entry["name"] not in IN_TIME:
+        return list(looked)
+    time = next(a for a in looked if a.name == "time")
+    directed = next(a for a in looked if a.name == "position" and a.odd is not None)
+    return [replace(time, odd=directed.odd) if IN_TIME[str(entry["name"])] else time]
 
 
 def left_over(places: Sequence[Place]) -> Curve | None:
@@ -73,7 +90,6 @@ def left_over(places: Sequence[Place]) -> Curve | None:
 def _along(looked: Sequence[Axis], force: Floats, without: Floats, period: object) -> Curve:
     """Draw along the axis in whose bins most of the force is, a wave along the stroke."""
     if isinstance(period, int | float):
-        looked = looked[:2]  # position, and position with the sign of the motion
         tables = [_binned(a, _wave_edges(a.values, float(period)), force, without) for a in looked]
     else:
         tables = [_binned(a, _edges(a), force, without) for a in looked]
@@ -120,4 +136,5 @@ def _explained(table: _Table, force: Floats) -> float:
 
 def _curve(axis: Axis, table: _Table) -> Curve:
     kept = table.rows > 0
-    return Curve(axis.name, axis.unit, table.centres[kept], table.data[kept], table.curve[kept])
+    signed = axis.odd is not None
+    return Curve(axis.name, axis.unit, table.centres[kept], table.data[kept], table.curve[kept], signed)

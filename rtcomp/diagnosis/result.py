@@ -93,8 +93,9 @@ class Named:
     share: float
     """Part of the mismatch (squared, above the floor) explained by it, 0 to 1."""
     separate_by: str = ""
-    curve: tuple[str, str, Floats, Floats, Floats] | None = None
-    """To draw: axis, unit, x (B,), mean residual without it (N), the named curve (N)."""
+    curve: tuple[str, str, Floats, Floats, Floats, bool] | None = None
+    """To draw: axis, unit, x (B,), mean residual without it (N), the named curve (N), and whether both are
+    given the sign of the motion."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the effect as the contract writes it."""

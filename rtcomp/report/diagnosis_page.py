@@ -162,8 +162,8 @@ def _named(effect: Named, force: str) -> Section:
     )
     figure = None
     if effect.curve is not None:
-        axis, unit, x, data, curve = effect.curve
-        figure = named_figure(axis, unit, x, data, curve, name=first, force_unit=force)
+        axis, unit, x, data, curve, signed = effect.curve
+        figure = named_figure(axis, unit, x, data, curve, name=first, force_unit=force, signed=signed)
     rows = [(name, *cells(value)) for name, value in effect.parameters.items()]
     table = Columns(("Parameter", "Value", "95 % interval"), rows, figures=(1, 2)) if rows else None
     return Section(f"Named: {title(effect)}", "\n\n".join(lines), figure, table)
@@ -176,8 +176,10 @@ def _unexplained(found: Diagnosis, force: str) -> list[Section]:
             continue
         figure = None
         if effect.curve is not None:
-            axis, unit, x, data, curve = effect.curve
-            figure = named_figure(axis, unit, x, data, curve, name="smooth curve", force_unit=force)
+            axis, unit, x, data, curve, signed = effect.curve
+            figure = named_figure(
+                axis, unit, x, data, curve, name="smooth curve", force_unit=force, signed=signed
+            )
         prose = f"No entry of the catalogue explains {percent(effect.share)} of the mismatch."
         if figure is not None:
             prose += (

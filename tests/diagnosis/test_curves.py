@@ -49,9 +49,16 @@ def test_each_of_two_is_drawn_without_the_other() -> None:
 
 def test_what_changes_sign_with_the_motion_is_drawn_so() -> None:
     (curve,) = drawn([UNEVEN])
-    assert curve.axis == "position"
+    assert curve.axis == "position" and curve.signed
     wave = np.sin(2 * np.pi * curve.x / 2e-4)
     assert abs(np.corrcoef(curve.curve, wave)[0, 1]) > 0.8
+
+
+def test_friction_that_drifts_is_drawn_along_time_with_the_sign_of_the_motion() -> None:
+    (curve,) = drawn([{"name": "friction-drift", "change": 0.3, "time_constant": 3.0}])
+    assert (curve.axis, curve.unit, curve.signed) == ("time", "s", True)
+    grown = -np.expm1(-curve.x / 3.0)
+    assert abs(np.corrcoef(curve.curve, grown)[0, 1]) > 0.95
 
 
 def test_an_effect_that_does_nothing_has_no_curve() -> None:

@@ -64,7 +64,7 @@ def missing(rows: int = 30_000) -> Diagnosis:
             Named(("cogging",), 0.998,
                   {"amplitude": Value(0.561, 0.548, 0.574, "N"),
                    "period": Value(6.111e-4, 6.108e-4, 6.114e-4, "m"),
-                   "phase": Value(1.70, 1.66, 1.74, "rad")}, 0.83, curve=("position", "m", x, data, curve)),
+                   "phase": Value(1.70, 1.66, 1.74, "rad")}, 0.83, curve=("position", "m", x, data, curve, False)),
             Named(("drive-offset", "constant-force", "gravity"), 0.97,
                   {"offset": Value(-0.33, -0.34, -0.32, "V")}, 0.14,
                   separate_by="the same motion with the axis turned over"),
@@ -115,5 +115,5 @@ def unexplained() -> Diagnosis:
     whole = missing(2000)
     x = np.linspace(-3e-4, 3e-4, 40)
     bump = np.exp(-((x / 6e-5) ** 2))
-    rest = Named(("unexplained",), 1.0, {}, 0.2, curve=("position", "m", x, bump, bump))
+    rest = Named(("unexplained",), 1.0, {}, 0.2, curve=("position", "m", x, bump, bump, False))
     return replace(whole, effects=[whole.effects[0], rest])

@@ -12,6 +12,7 @@ from rtcomp.report.figures import canvas as c
 from rtcomp.report.quantities import Scale, scale
 
 BEFORE, AFTER, NAMED = "as believed, refitted", "extended stage", "what was named"
+FORCE, SIGNED = "Residual force", "Residual force, with the sign of the motion"
 _FEW = 6
 """Points up to which each is drawn with its own error bar."""
 _MANY = 60
@@ -88,14 +89,16 @@ def named_figure(
     *,
     name: str = NAMED,
     force_unit: str = "N",
+    signed: bool = False,
 ) -> go.Figure:
     """Return the residual force without the named effect (`data`, in bins at `x`) and its curve over it.
 
-    Raises ValueError where lengths differ.
+    Where `signed`, both are given the sign of the motion, and the axis says so. Raises ValueError where
+    lengths differ.
     """
     at, points, line = c.floats(x), c.floats(data), c.floats(curve)
     c.same_length(x=at, data=points, curve=line)
-    along, up, figure = _axes(axis, unit, at, force_unit, [points, line])
+    along, up, figure = _axes(axis, unit, at, force_unit, [points, line], SIGNED if signed else FORCE)
     if c.say_if_empty(figure, [points, line]):
         return figure
     _zero(figure)
@@ -151,12 +154,12 @@ def residual_figure(
 
 
 def _axes(
-    axis: str, unit: str, x: Floats, force_unit: str, ys: list[Floats | None]
+    axis: str, unit: str, x: Floats, force_unit: str, ys: list[Floats | None], what: str = FORCE
 ) -> tuple[Scale, Scale, go.Figure]:
     along = scale(unit, x)
     up = scale(force_unit, *(y for y in ys if y is not None))
     title = c.titled(axis[:1].upper() + axis[1:], along.unit)
-    return along, up, c.canvas(title, c.titled("Residual force", up.unit))
+    return along, up, c.canvas(title, c.titled(what, up.unit))
 
 
 def _zero(figure: go.Figure) -> None:
