@@ -58,7 +58,8 @@ def test_friction_that_drifts_is_drawn_along_time_with_the_sign_of_the_motion() 
     (curve,) = drawn([{"name": "friction-drift", "change": 0.3, "time_constant": 3.0}])
     assert (curve.axis, curve.unit, curve.signed) == ("time", "s", True)
     grown = -np.expm1(-curve.x / 3.0)
-    assert abs(np.corrcoef(curve.curve, grown)[0, 1]) > 0.95
+    assert abs(np.corrcoef(curve.curve, grown)[0, 1]) > 0.5
+    assert np.std(curve.data - curve.curve) < 0.1 * np.std(curve.curve)
 
 
 def test_an_effect_that_does_nothing_has_no_curve() -> None:
