@@ -107,7 +107,9 @@ class _Table(NamedTuple):
 def _edges(axis: Axis) -> Floats:
     if axis.name == "direction":
         return np.array([-1.5, -0.5, 0.5, 1.5])
-    edges = np.unique(np.quantile(axis.values, np.linspace(0.0, 1.0, BINS // 2 + 1)))
+    # What has the sign of the motion is told from what the motion does by means over many strokes.
+    count = BINS // 8 if axis.name == "time" and axis.odd is not None else BINS // 2
+    edges = np.unique(np.quantile(axis.values, np.linspace(0.0, 1.0, count + 1)))
     return edges if edges.size > 1 else np.array([edges[0] - 0.5, edges[0] + 0.5])
 
 
