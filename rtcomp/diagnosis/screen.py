@@ -111,9 +111,9 @@ def _as_believed(scene: Scene, others: list[Effect], power: float) -> list[Scree
         return []
 
     def tried(point: Point) -> Screened | None:
-        at_work_too = [*others, effect_of(point.entry)]
         try:
-            own = fit_base(ledger.stage, scene.motion, at_work_too, (1.0,), ledger.memory)
+            effects = [*others, effect_of(point.entry)]
+            own = fit_base(ledger.stage, scene.motion, effects, (1.0,), ledger.memory)
         except ConfigError:
             return None
         scale = power / max(float(own.system.blocks.power[ledger.seen].sum()), 1e-300)
