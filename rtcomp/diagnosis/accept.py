@@ -30,9 +30,10 @@ EXACT = (
     "viscous-friction",
 )  # fmt: skip
 """Entries whose kernels leave nothing of what they stand for, however much that is."""
-BESIDE, MORE = 0.15, 0.3
+BESIDE, MORE, MOST_OF_IT = 0.15, 0.3, 0.5
 """Part of what the entries before it explain, from which on a further entry counts beside them, and the part
-of what is left that it must explain then;"""
+of what is left that it must explain then: in general, and where it is large only beside what of them is not
+exact;"""
 REST = 0.6
 """part of what is left that it must explain else,"""
 LEAST_BESIDE = 0.05
@@ -93,21 +94,22 @@ def modelled(names: Iterable[str], gains: Iterable[float]) -> float:
 
 
 def settles_the_rest(
-    named: float, before: Floats, after: Floats, floor: Floats, shapeless: bool = False
+    named: float, before: Floats, after: Floats, floor: Floats, shapeless: bool = False, exact: float = 0.0
 ) -> bool:
     """Tell whether a further entry has a weight of its own, not one that trims how others are modelled.
 
-    `named` is what those before it explain (`modelled`). All that they leave is no such weight where the
-    entry is `shapeless`: a free curve trims anything.
+    `named` is what those before it explain (`modelled`), `exact` what the others of them do. All that they
+    leave is no such weight where the entry is `shapeless`: a free curve trims anything.
     """
     gained = float(before.sum() - after.sum())
     of_rest = gained / float(max(before.sum() - floor.sum(), 1e-300))
     beside = gained / max(named, 1e-300)
     each = before - after
+    more = MORE if gained > BESIDE * (named + exact) else MOST_OF_IT
     steady = float(each.mean()) > SURE * float(each.std(ddof=1) / np.sqrt(each.size))
     everywhere = steady and bool(np.mean(each > 0.05 * before) >= 0.9)
     return (
         (of_rest > ALL and not shapeless)
-        or (beside > BESIDE and of_rest > MORE)
+        or (beside > BESIDE and of_rest > more)
         or (beside > LEAST_BESIDE and (of_rest > REST or everywhere))
     )

@@ -34,8 +34,9 @@ MOST = 4
 RIVAL, HALF = 0.7, 0.3
 """Part of the first entry's gain from which on another is tried in its place: in general, and in the place of
 a free curve,"""
-TOGETHER, SHAPED = 0.6, 0.95
-"""and the part of the error with the first and its second that the other and its own must not exceed."""
+TOGETHER, SHAPED, SPARED = 0.6, 0.95, 1.25
+"""and the part of the error with the first and its second that the other and its own must not exceed: in
+general, in the place of a free curve, and there if they come down to the floor."""
 RIVALS, HOPELESS = 2, 100.0
 """Others tried so at the most, and times the error with the first that they may leave alone."""
 ONCE = 4.0
@@ -115,6 +116,7 @@ def decide(
     decision = Decision(refined, choices, base)
     ahead: Addition | None = None
     greedy: Refined | None = None
+    free_curve: Refined | None = None
     for step in range(MOST):
         once = _once(motion, current, floor)
         if current.errors.sum() < ABOVE_FLOOR * floor.sum() and not (looked_at and not entries) and not once:
@@ -126,6 +128,8 @@ def decide(
         ahead = None
         if step == 0:
             decision.first_look, decision.first_refined = added.looked, added.gains
+            contenders = [r for r in (added.best, *added.others) if r is not None]
+            free_curve = next((r for r in contenders if last(r) in SHAPELESS), None)
             greedy = added.best
             added, ahead = _look_ahead(stage, motion, current, added, floor, part_of(step), without)
         best = added.best
@@ -140,7 +144,8 @@ def decide(
             decision.faint = True
         elif near and shapeless and not stands_out(current.errors, best.errors):
             break
-        if entries and not settles_the_rest(explained, current.errors, best.errors, floor, shapeless):
+        exact = sum(c.gain for c in choices) - explained
+        if entries and not settles_the_rest(explained, current.errors, best.errors, floor, shapeless, exact):
             break
         gained = float(current.errors.sum() - best.errors.sum())
         names, probability = alike(best, added.others, current, floor)
@@ -149,7 +154,9 @@ def decide(
         entries, current = refined.entries, refined.fitted
     if len(choices) > 1:
         refined = _exchange(stage, motion, refined, choices, floor, part_of(MOST - 1), without)
-    refined, choices = _prune(stage, motion, base, refined, choices, floor)
+    refined, choices = _prune(stage, motion, refined, choices, floor)
+    if free_curve is not None:
+        refined, choices = _without_names(base, refined, choices, free_curve)
     first = {c.names[0] for c in choices}
     for choice in choices:
         choice.names[1:] = [n for n in choice.names[1:] if n not in first]
@@ -214,8 +221,9 @@ def _look_ahead(
         both = other.best
         if both is None or not worth_it(base.errors, both.errors, floor):
             continue
-        alone = modelled([last(rival)], [float(base.errors.sum() - rival.errors.sum())])
-        if not settles_the_rest(alone, rival.errors, both.errors, floor):
+        alone = float(base.errors.sum() - rival.errors.sum())
+        told = modelled([last(rival)], [alone])
+        if not settles_the_rest(told, rival.errors, both.errors, floor, exact=alone - told):
             continue
         pair = float(both.errors.sum())
         if not asked and not (pair < done and last(both) not in SHAPELESS):
@@ -236,7 +244,7 @@ def _most_left(chosen: str, second: str, left: float, enough: float) -> float:
     A free curve gives way to a name that does nearly as well, but not to one that needs the curve beside it.
     """
     spares = chosen in SHAPELESS and second not in SHAPELESS
-    return max(SHAPED * left, enough) if spares else TOGETHER * left
+    return max(SHAPED * left, min(enough, SPARED * left)) if spares else TOGETHER * left
 
 
 def _exchange(
@@ -283,10 +291,20 @@ def _moved(entries: list[Entry], to: int) -> list[Entry]:
     return [*entries[:to], entries[-1], *entries[to:-1]]
 
 
+def _without_names(
+    base: Fitted, refined: Refined, choices: list[Choice], free_curve: Refined
+) -> tuple[Refined, list[Choice]]:
+    """Return the `free_curve` alone where it is among the entries and does as well without their names."""
+    beside = len(choices) > 1 and any(c.names[0] in SHAPELESS for c in choices)
+    alone = float(free_curve.errors.sum())
+    if not beside or SHAPED * alone > float(refined.errors.sum()):
+        return refined, choices
+    return free_curve, [Choice([last(free_curve)], 1.0, float(base.errors.sum()) - alone)]
+
+
 def _prune(
     stage: Stage,
     motion: Motion,
-    base: Fitted,
     refined: Refined,
     choices: list[Choice],
     floor: Floats,

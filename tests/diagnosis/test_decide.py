@@ -45,7 +45,9 @@ def test_what_is_exactly_modelled_leaves_nothing_to_trim() -> None:
     assert not settles_the_rest(by_hysteresis, left, 0.5 * left, floor)
     for exact in ("quadratic-drag", "drive-saturation"):
         by_weight = modelled(["gravity", exact], [10.0, 90.0])
-        assert settles_the_rest(by_weight, left, 0.5 * left, floor)
+        assert settles_the_rest(by_weight, left, 0.4 * left, floor, exact=100.0)
+        assert not settles_the_rest(by_weight, left, 0.6 * left, floor, exact=100.0)
+    assert settles_the_rest(0.0, left, 0.6 * left, floor, exact=0.3)
 
 
 def test_all_that_is_left_is_no_weight_of_a_free_curve() -> None:
@@ -120,3 +122,8 @@ def test_a_free_curve_gives_way_to_a_name_unless_it_stays_beside_it(
     chosen: str, second: str, most: float
 ) -> None:
     assert _most_left(chosen, second, 10.0, 1.0) == pytest.approx(most)
+
+
+def test_two_names_at_the_floor_replace_a_free_curve_that_leaves_nearly_as_much() -> None:
+    assert _most_left("position-force", "parallel-spring", 10.0, 11.0) == pytest.approx(11.0)
+    assert _most_left("position-force", "parallel-spring", 10.0, 20.0) == pytest.approx(12.5)
