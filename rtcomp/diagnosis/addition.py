@@ -25,7 +25,7 @@ LEAST_SHARE = 0.008
 """Part of the squared error that a search must explain to be short-listed."""
 QUICK, CONTENDERS = 2, 3
 """Steps of refinement for the whole short list, and how many of it are refined to the end."""
-FAR, FURTHER, NOTHING = 3.0, 30.0, 0.002
+FAR, FURTHER, NOTHING = 3.0, 100.0, 0.002
 """Times the error of the first after those few steps, from which on another is refined to the end only if the
 first leaves more than this part of what there was: if it is a name, if it is a free curve."""
 NEARLY = 0.93
@@ -155,7 +155,8 @@ def _settle_contenders(
     shapeless = last(tried[0]) in SHAPELESS
     for far in False, True:
         group = [at for at in contend if (at in near) != far]
-        forms = [(at, form) for at in group for form in (tried[at], *also.get(last(tried[at]), []))]
+        other = {} if far and shapeless else also
+        forms = [(at, form) for at in group for form in (tried[at], *other.get(last(tried[at]), []))]
         settled = shared(lambda form: _well_settled(stage, motion, form[1]), forms)
         for at in group:
             own = [found for (of, _), found in zip(forms, settled, strict=True) if of == at]
