@@ -59,6 +59,9 @@ def cli() -> None:
 def main() -> None:
     """Run the command line of this process and exit with its status."""
     signal.signal(signal.SIGTERM, _terminated)
+    # Matrices are small here: threads for them cost more than they give, and take cores from loop and search.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     status = run(sys.argv[1:])
     gc.freeze()  # what lives to the end is not searched for cycles there: a tenth of a second
     sys.exit(status)

@@ -25,7 +25,7 @@ LEAST_SHARE = 0.008
 """Part of the squared error that a search must explain to be short-listed."""
 QUICK, CONTENDERS = 2, 3
 """Steps of refinement for the whole short list, and how many of it are refined to the end."""
-FAR, FURTHER, NOTHING = 3.0, 100.0, 0.002
+FAR, FURTHER, NOTHING = 3.0, 100.0, 0.01
 """Times the error of the first after those few steps, from which on another is refined to the end only if the
 first leaves more than this part of what there was: if it is a name, if it is a free curve."""
 NEARLY = 0.93
@@ -202,14 +202,14 @@ def settle(
     near = tuple(sorted({1.0, *(min(max(scale, SCALES[0]), SCALES[-1]) for scale in beside)}))
     memory = refined.fitted.ledger.memory
     base = fit_base(stage, motion, effects, scales or near, memory)
-    found = refine(base, motion, refined.entries)
+    found = refine(base, motion, refined.entries, searching=True)
     for _ in range(AGREE):
         if _agrees(found):
             break
         # Sizes refined on friction that is not the one found beside them hold for neither.
         effects = [effect_of(e) for e in found.entries]
         base = fit_base(stage, motion, effects, (found.fitted.scale,), memory)
-        found = refine(base, motion, found.entries, tries=4)
+        found = refine(base, motion, found.entries, tries=4, searching=True)
     return found
 
 

@@ -157,6 +157,7 @@ def decide(
     refined, choices = _prune(stage, motion, refined, choices, floor)
     if free_curve is not None:
         refined, choices = _without_names(base, refined, choices, free_curve)
+    refined = refine(refined.fitted, motion, refined.entries)
     first = {c.names[0] for c in choices}
     for choice in choices:
         choice.names[1:] = [n for n in choice.names[1:] if n not in first]

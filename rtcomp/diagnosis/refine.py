@@ -35,6 +35,8 @@ HEAVY = 0.5
 """Part of the drive's force that friction takes by load, at the most."""
 SETTLED = 1e-4
 """Gain of a step, relative, from which on a step of less than the derivative's own ends the search."""
+NEARLY = 1e-3
+"""Gain of a step, relative, from which on it does not matter which of two entries is the better."""
 TRIES = 12
 """Steps of Levenberg and Marquardt at the most."""
 
@@ -196,8 +198,9 @@ def refine(
     entries: Sequence[Entry],
     which: Sequence[int] | None = None,
     tries: int = TRIES,
+    searching: bool = False,
 ) -> Refined:
-    """Move the parameters of `entries` to where the residual is smallest.
+    """Move the parameters of `entries` to where the residual is smallest, or near it while `searching`.
 
     Raises ConfigError where the entries as given cannot be evaluated.
     """
@@ -248,6 +251,8 @@ def refine(
         current, fitted, residual, belief = trial, tried, left, further
         knobs = knobs_of(current, motion, which)
         damping = max(damping * 0.2, 1e-6)
+        if searching and gained < NEARLY:
+            break
         if gained < SETTLED and float(np.max(np.abs(move))) < 1.0:
             break
     return Refined(current, fitted, knobs, jacobian, residual, away)
