@@ -29,7 +29,7 @@ SLOW = (
     "rtcomp trial",
     "rtcomp hil",
     "demo --seed",
-    "paper --out",
+    "rtcomp paper",
     "bench loop",
     "bench link",
 )
