@@ -3,14 +3,16 @@
     python tools/bench_diagnosis.py DATA --json diagnosis.json
 
 Time and memory are those of the installed command, from the start of its process: until the place of the
-mismatch stands on the terminal, and until the end. `--minutes 60` adds an hour at 10 kHz. DATA holds
-`sealed-dev` (cases with answers.json), `real/emps/DATA_EMPS.mat` and
+mismatch stands on the terminal, and until the end. `--pairs` adds two effects at a time, which take longest
+to tell, `--minutes 60` an hour at 10 kHz. DATA holds `sealed-dev` (cases with answers.json),
+`real/emps/DATA_EMPS.mat` and
 `real/heads-yaw/yaw_sine_to_330s.csv.gz`; what is not there is skipped.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sys
 import tempfile
@@ -41,6 +43,22 @@ RETUNINGS = {
     "friction-level": "friction.level",
     "viscous-friction": "viscous",
 }
+COGGING: dict[str, Any] = {"name": "cogging", "amplitude": 0.4, "period": 1e-4}
+PAIRS: list[list[dict[str, Any]]] = [
+    [
+        {"name": "stribeck", "rise": 0.4, "velocity": 9e-4},
+        {"name": "parallel-spring", "stiffness": 2400.0},
+    ],
+    [
+        {"name": "backlash", "gap": 8e-6, "share": 0.6},
+        {"name": "stiction-ageing", "growth": 0.3, "distance": 1e-5},
+    ],
+    [
+        COGGING,
+        {"name": "load-dependent-friction", "coefficient": 0.3},
+    ],
+]
+"""Hidden together: two that hide in each other, two that change friction's memory, a wave and friction by load."""
 ALIASES = {"local-bump": "position-force"}
 
 
@@ -115,15 +133,15 @@ def yaw(path: Path) -> list[Figure]:
     ]
 
 
-def hidden(rate: float, seconds: float) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Return the shipped stage at `rate`, and a recording of it with cogging that it lacks."""
+def hidden(
+    rate: float, seconds: float, effects: list[dict[str, Any]]
+) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Return the shipped stage at `rate`, and a recording of it with `effects` that it lacks."""
     config = Configuration.load(shipped("leuven.yaml"))
     belief = {**config.stage.to_dict(), "rate": rate}
-    cogging = config.stage.with_changes(
-        stage={"effects": [{"name": "cogging", "amplitude": 0.4, "period": 1e-4}]}
-    )
+    true = config.stage.with_changes(stage={"effects": effects})
     motion = {**config.file.data["compensate"]["reference"], "duration": seconds}
-    run = closed_loop(config.changed(**{**cogging.to_dict(), "rate": rate}, reference=motion))
+    run = closed_loop(config.changed(**{**true.to_dict(), "rate": rate}, reference=motion))
     return belief, {k: run.columns[k] for k in ("time", "reference", "position", "voltage")}
 
 
@@ -137,9 +155,25 @@ def command(folder: Path, recording: str, belief: dict[str, Any]) -> Shown:
     )  # fmt: skip
 
 
+def pairs(seconds: float, folder: Path) -> list[Figure]:
+    """So long at 1 kHz of the simulated stage with two effects that the belief lacks, as CSV."""
+    found = []
+    for effects in PAIRS:
+        belief, columns = hidden(1000.0, seconds, effects)
+        write_csv(folder / "run.csv", columns, True)
+        shown = command(folder, "run.csv", belief)
+        shutil.rmtree(folder / "out")
+        said = re.search("(Missing: |Something |Nothing |No physics )[^\r]*", shown.text)
+        what = " and ".join(str(e["name"]) for e in effects)
+        found.append(
+            Figure(f"{seconds:g} s at 1 kHz, {what}", shown.seconds, "s", "<= 60", said[0] if said else "")
+        )
+    return found
+
+
 def pace(seconds: float, folder: Path) -> list[Figure]:
     """So long at 1 kHz of the simulated stage with cogging that the belief lacks, as CSV."""
-    belief, columns = hidden(1000.0, seconds)
+    belief, columns = hidden(1000.0, seconds, [COGGING])
     write_csv(folder / "run.csv", columns, True)
     command(folder, "run.csv", belief)  # kernels compiled, once for all
     shutil.rmtree(folder / "out")
@@ -163,7 +197,7 @@ def fast(folder: Path, minutes: int, rate: float = 1e4, stretch: float = 60.0) -
     import h5py
 
     settling = 10.0  # a whole period of the motion, as `stretch` is
-    belief, columns = hidden(rate, settling + stretch)
+    belief, columns = hidden(rate, settling + stretch, [COGGING])
     rows = int(stretch * rate)
     chance = np.random.default_rng(1)
     with h5py.File(folder / "fast.h5", "w") as file:
@@ -189,13 +223,17 @@ def fast(folder: Path, minutes: int, rate: float = 1e4, stretch: float = 60.0) -
 @click.command()
 @click.argument("data", required=False, type=click.Path(path_type=Path))
 @click.option("--seconds", default=60.0, show_default=True, help="Of the simulated recording.")
+@click.option("--pairs", "both", is_flag=True, help="Two effects at a time too.")
 @click.option(
     "--minutes", type=click.IntRange(0), default=0, help="So many at 10 kHz too; an hour needs 2 GB of disk."
 )
 @click.option("--json", "path", type=click.Path(path_type=Path))
-def main(data: Path | None, seconds: float, minutes: int, path: Path | None) -> None:
+def main(data: Path | None, seconds: float, both: bool, minutes: int, path: Path | None) -> None:
     with tempfile.TemporaryDirectory() as folder:
         figures = pace(seconds, Path(folder))
+    if both:
+        with tempfile.TemporaryDirectory() as folder:
+            figures += pairs(seconds, Path(folder))
     if minutes:
         with tempfile.TemporaryDirectory() as folder:
             figures += fast(Path(folder), minutes)
