@@ -58,7 +58,7 @@ PAIRS: list[list[dict[str, Any]]] = [
         {"name": "load-dependent-friction", "coefficient": 0.3},
     ],
 ]
-"""Hidden together: two that hide in each other, two that change friction's memory, a wave and friction by load."""
+"""Hidden together: two that hide in each other, two that change friction's memory, waves and load."""
 ALIASES = {"local-bump": "position-force"}
 
 
