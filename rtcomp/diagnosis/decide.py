@@ -138,7 +138,8 @@ def decide(
             break
         near = step == 0 and current.errors.sum() < NEAR * floor.sum()
         shapeless = last(best) in SHAPELESS
-        if not together and not worth_it(current.errors, best.errors, floor):
+        jumped = once and last(best) == "sensor-jump" and not _once(motion, best.fitted, floor)
+        if not together and not jumped and not worth_it(current.errors, best.errors, floor):
             if step > 0 or shapeless or not stands_out(current.errors, best.errors):
                 break
             decision.faint = True
