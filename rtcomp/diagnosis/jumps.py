@@ -35,6 +35,9 @@ def jumps(time: Floats, position: Floats) -> list[tuple[float, float]]:
         at = int(np.argmax(clear))
         if clear[at] <= OUTSTANDING:
             break
+        # The steps beside a jump stand out as well, by two thirds of it.
+        begin = max(at - ITSELF, 0)
+        at = begin + int(np.argmax(size[begin : at + ITSELF + 1]))
         found.append((float(0.5 * (time[at + 2] + time[at + 3])), float(off[at])))
         clear[max(at - 20, 0) : at + 21] = 0.0
     return found
