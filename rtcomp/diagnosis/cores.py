@@ -48,15 +48,18 @@ def shared(
     lock = threading.Lock()
     helpers = _helpers()
 
+    def leave_the_rest() -> None:
+        with lock:
+            for _ in left:
+                pass
+
     def work(say: Callable[[float], None] | None) -> None:
         for at, item in _taken(left, lock):
             try:
                 found[at] = function(item)
             except BaseException as error:  # raised below, in the calling thread
                 failed[at] = error
-                with lock:
-                    for _ in left:  # nobody needs the others any more
-                        pass
+                leave_the_rest()
             if say is not None:
                 say((len(found) + len(failed)) / len(all_items))
 
@@ -72,6 +75,7 @@ def shared(
     try:
         work(done)
     finally:
+        leave_the_rest()  # an interrupt or `done` may have ended the caller's part
         for helper in at_work:
             helper.result()
     if failed:

@@ -158,18 +158,26 @@ class Ledger:
 
     def _behind(self, sensors: Sequence[Effect], play: Effect) -> list[Floats]:
         """Return the position (m) of the load behind a play along each strip."""
-        own = self.found_with_play and (self.weights.tobytes(), self.reaches.tobytes())
+        own = self._believes_load() is None and (self.weights.tobytes(), self.reaches.tobytes())
         return self.memory.loads.of(
             (_key(sensors), _key([play]), own),
             lambda: [self._drawn(x, play) for x, _, _ in self._kinematics(sensors)],
         )
 
+    def _believes_load(self) -> tuple[Floats, Floats] | None:
+        """Return the believed stiffnesses and reaches where they hold for the load, else None: those at hand.
+
+        As believed: a play that is not yet in the balance is taken for longer reaches.
+        """
+        friction = self.stage.friction
+        if not isinstance(friction, MaxwellSlip) or self.found_with_play:
+            return None
+        stiffnesses, reaches = zip(*friction.elements, strict=True)
+        return np.array(stiffnesses), np.array(reaches)
+
     def _drawn(self, x: Floats, play: Effect) -> Floats:
-        m, friction = self.stage.mechanics, self.stage.friction
-        weights, reaches = self.weights, self.reaches
-        if isinstance(friction, MaxwellSlip) and not self.found_with_play:
-            # As believed: a play that is not yet in the balance is taken for longer reaches.
-            weights, reaches = (np.array(c) for c in zip(*friction.elements, strict=True))
+        m = self.stage.mechanics
+        weights, reaches = self._believes_load() or (self.weights, self.reaches)
         load = Load(
             play.values["share"] * m.mass, m.viscous, m.micro_damping, m.micro_damping_speed, weights, reaches
         )
@@ -183,33 +191,27 @@ class Ledger:
         play: Effect | None,
     ) -> Floats:
         """Return the units of friction on the kept rows."""
+
+        def found() -> Floats:
+            rows = []
+            for i, (strip, path) in enumerate(
+                zip(self.motion.strips, self._kinematics(sensors), strict=True)
+            ):
+                x, v, a = path
+                if play is not None:
+                    x = self._behind(sensors, play)[i]
+                    v, a = derivatives(x, self.motion.period)
+                held = np.append(strip.voltage[:1], strip.voltage[:-1])
+                motion = np.column_stack([strip.time, x, v, a, held])
+                rows.append(
+                    units_along(self.stage, before, modifiers, self.reaches, self.weights, motion, self.grain)
+                )
+            return self.motion.smooth(rows)
+
         weighs = play is not None or any(e.name in WHOLE for e in modifiers)
         behind = play is not None and (_key([play]), self.found_with_play)
         own = self.reaches.tobytes(), weighs and self.weights.tobytes()
-        return self.memory.frictions.of(
-            (_key(before), _key(modifiers), _key(sensors), behind, own),
-            lambda: self._units(before, modifiers, sensors, play),
-        )
-
-    def _units(
-        self,
-        before: Sequence[Effect],
-        modifiers: Sequence[Effect],
-        sensors: Sequence[Effect],
-        play: Effect | None,
-    ) -> Floats:
-        rows = []
-        for i, (strip, (x, v, a)) in enumerate(
-            zip(self.motion.strips, self._kinematics(sensors), strict=True)
-        ):
-            if play is not None:
-                x = self._behind(sensors, play)[i]
-                v, a = derivatives(x, self.motion.period)
-            held = np.append(strip.voltage[:1], strip.voltage[:-1])
-            motion = np.column_stack([strip.time, x, v, a, held])
-            found = units_along(self.stage, before, modifiers, self.reaches, self.weights, motion, self.grain)
-            rows.append(found)
-        return self.motion.smooth(rows)
+        return self.memory.frictions.of((_key(before), _key(modifiers), _key(sensors), behind, own), found)
 
     def _driven(self, drive: Sequence[Effect], sensors: Sequence[Effect]) -> list[Floats]:
         """Return the force of the drive (N) around the rows of each strip."""

@@ -67,6 +67,22 @@ def test_the_first_failure_by_order_is_raised_and_the_rest_left() -> None:
     assert shared(lambda i: i, [1, 2]) == [1, 2]  # and whoever helped is there again
 
 
+def test_what_ends_the_caller_ends_the_others_too() -> None:
+    tried: list[int] = []
+
+    def stop(_part: float) -> None:
+        raise KeyboardInterrupt
+
+    def slow(i: int) -> None:
+        tried.append(i)
+        time.sleep(0.002)
+
+    with pytest.raises(KeyboardInterrupt):
+        shared(slow, range(1000), stop)
+    assert len(tried) < 100
+    assert shared(lambda i: i, [1, 2]) == [1, 2]
+
+
 def test_progress_is_heard_in_the_calling_thread_and_rises() -> None:
     heard: list[tuple[float, int]] = []
     shared(lambda i: time.sleep(0.001), range(30), lambda part: heard.append((part, threading.get_ident())))

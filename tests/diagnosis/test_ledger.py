@@ -12,9 +12,10 @@ from recorded import STAGE, run, stage, there_and_back
 from rtcomp.diagnosis.bank import units_along
 from rtcomp.diagnosis.base import fit_base
 from rtcomp.diagnosis.candidates import effect_of
-from rtcomp.diagnosis.ledger import believed_weights
+from rtcomp.diagnosis.ledger import Ledger, believed_weights, grid_of
 from rtcomp.diagnosis.motion import UNSEEN, WASHED, WINDOW_ROWS, WINDOWS, Strip, averaged, prepare
 from rtcomp.diagnosis.refine import consistent, refine
+from rtcomp.diagnosis.remembered import Memory
 from rtcomp.kernels import Floats
 from rtcomp.physics import build
 from rtcomp.physics.effect import Place
@@ -199,3 +200,36 @@ def test_a_loads_coefficient_is_that_of_the_friction_it_ends_with() -> None:
     base.ledger.weigh(believed_weights(stage(), base.ledger.reaches))
     found = consistent(refine(base, motion, [start]))
     assert found.entries[0]["coefficient"] == pytest.approx(0.15, rel=0.05)
+
+
+LUGRE = {
+    "model": "lugre", "stiffness": 2.6e5, "damping": 1e3, "coulomb": 1.5, "static": 1.5,
+    "stribeck_velocity": 1e-3, "viscous": 0.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("friction", [STAGE["stage"]["friction"], LUGRE], ids=["stop elements", "lugre"])
+@pytest.mark.parametrize(
+    "entry",
+    [
+        {"name": "backlash", "gap": 3e-6},
+        {"name": "load-dependent-friction", "coefficient": 0.1},
+        {"name": "creep", "fraction": 0.2, "time_constant": 0.3},
+        {"name": "drive-lag", "time_constant": 2e-3},
+        {"name": "sensor-delay", "delay": 2e-3},
+    ],
+    ids=lambda entry: str(entry["name"]),
+)
+def test_what_grids_share_is_what_each_would_make_for_itself(entry: dict[str, Any], friction: Any) -> None:
+    axis = stage(friction=friction)
+    motion = prepare(axis, [run(stage(), there_and_back(4.0))])
+    memory = Memory()
+    for scale in (0.7, 1.0, 1.4, 1.0):
+        alone, sharing = (Ledger(axis, motion, grid_of(axis, scale), [], m) for m in (Memory(), memory))
+        for _ in range(2):  # as believed, then with what was found
+            one, other = (ledger.system([effect_of(entry)]) for ledger in (alone, sharing))
+            assert np.array_equal(one.columns, other.columns) and np.array_equal(one.y, other.y)
+            found = one.blocks.power[0] * np.linspace(1.0, 2.0, alone.reaches.size)
+            for ledger in (alone, sharing):
+                ledger.weigh(found)
+                ledger.found_with_play = True
