@@ -8,6 +8,7 @@ from __future__ import annotations
 import gzip
 import json
 import math
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -21,9 +22,10 @@ BENCHMARKS = sorted(path.name for path in (TOP / "tools").glob("bench_*.py"))
 
 
 def bench(name: str, *arguments: object, timeout: float = 600.0) -> str:
+    # Two cores as everywhere where figures are judged: every further one takes memory of its own.
     done = subprocess.run(
         [sys.executable, f"tools/{name}", *map(str, arguments)], cwd=TOP, capture_output=True, text=True,
-        timeout=timeout, stdin=subprocess.DEVNULL,
+        timeout=timeout, stdin=subprocess.DEVNULL, env={**os.environ, "NUMBA_NUM_THREADS": "2"},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -103,8 +105,9 @@ def test_a_diagnosis_without_recordings_to_judge(tmp_path: Path) -> None:
     found = figures(tmp_path, "bench_diagnosis.py", "--seconds", 15, "--minutes", 3)
     assert "cogging" in found["15 s at 1 kHz: everything"]["note"]
     assert found["15 s at 1 kHz: where, on the terminal after"]["value"] < 10.0
-    # Four columns of a float64, twice over, and what the program is by itself.
-    assert found["3 min at 10 kHz: memory"]["value"] < 0.8
+    # Four columns of a float64, twice over (0.12 GB), the program by itself, and what a search remembers,
+    # which does not grow with the recording.
+    assert found["3 min at 10 kHz: memory"]["value"] < 1.2
 
 
 @pytest.mark.slow
