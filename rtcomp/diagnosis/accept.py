@@ -40,6 +40,9 @@ LEAST_BESIDE = 0.05
 """and part of what those before it explain,"""
 ALL = 0.85
 """unless it explains this part of all that is left: what is wrong with the first is not so well explained."""
+ELSE, SURPLUS, MOST = 1.2, 0.3, 0.7
+"""Times what the kernels of those before it leave of them, above which something else may be left; times that
+and the part of what is beyond it that a further entry must gain to be that."""
 NOISE, STEADILY = 0.7, 0.4
 """Times the floor that an entry must gain to be worth naming: in general, and where nearly all blocks gain
 and it explains most of what is left."""
@@ -113,3 +116,12 @@ def settles_the_rest(
         or (beside > BESIDE and of_rest > more)
         or (beside > LEAST_BESIDE and (of_rest > REST or everywhere))
     )
+
+
+def is_something_else(before: Floats, after: Floats, left: Floats, chance: float) -> bool:
+    """Tell whether a further entry explains most of what the kernels of those before it do not leave.
+
+    `left` is what they do leave, and `chance` what the entry gains of that (`Double`).
+    """
+    gained = float(before.sum() - after.sum()) - chance
+    return gained > max(SURPLUS * float(left.sum()), MOST * float(before.sum() - left.sum()))

@@ -12,8 +12,10 @@ import numpy as np
 
 from rtcomp.diagnosis.accept import (
     ABOVE_FLOOR,
+    ELSE,
     NEAR,
     SETTLED,
+    is_something_else,
     modelled,
     settles_the_rest,
     stands_out,
@@ -22,6 +24,7 @@ from rtcomp.diagnosis.accept import (
 from rtcomp.diagnosis.addition import Addition, Progress, best_addition, settle
 from rtcomp.diagnosis.alike import APART, ONE_THING, SHAPELESS, alike, last
 from rtcomp.diagnosis.base import Fitted
+from rtcomp.diagnosis.double import Double
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Refined, refine
 from rtcomp.diagnosis.scene import Entry
@@ -122,7 +125,10 @@ def decide(
         if current.errors.sum() < ABOVE_FLOOR * floor.sum() and not (looked_at and not entries) and not once:
             break
         explained = modelled((str(e["name"]) for e in entries), (c.gain for c in choices))
-        if entries and current.errors.sum() - floor.sum() < SETTLED * explained and not once:
+        double = Double.of(stage, refined, motion) if entries else None
+        left = floor if double is None else np.maximum(floor, double.errors)
+        settled = bool(entries) and current.errors.sum() - floor.sum() < SETTLED * explained
+        if settled and not once and (double is None or current.errors.sum() < ELSE * left.sum()):
             break
         added = ahead or best_addition(stage, motion, current, entries, part_of(step), without)
         ahead = None
@@ -146,8 +152,11 @@ def decide(
         elif near and shapeless and not stands_out(current.errors, best.errors):
             break
         exact = sum(c.gain for c in choices) - explained
-        if entries and not settles_the_rest(explained, current.errors, best.errors, floor, shapeless, exact):
-            break
+        if entries:
+            before, after = current.errors, best.errors
+            weighs = not settled and settles_the_rest(explained, before, after, floor, shapeless, exact)
+            if not weighs and not _is_something_else(double, best, before, left):
+                break
         gained = float(current.errors.sum() - best.errors.sum())
         names, probability = alike(best, added.others, current, floor)
         choices.append(Choice(names, probability, gained))
@@ -172,6 +181,13 @@ def _once(motion: Motion, current: Fitted, floor: Floats) -> bool:
     seen = np.flatnonzero(current.ledger.seen)
     far = current.errors > ONCE * np.maximum(floor, floor.mean())
     return bool(far[np.isin(seen, list(motion.jumped))].any())
+
+
+def _is_something_else(double: Double | None, best: Refined, before: Floats, left: Floats) -> bool:
+    """Tell whether the last entry of `best` explains what the kernels of those before it do not leave."""
+    if double is None or last(best) in SHAPELESS:
+        return False
+    return is_something_else(before, best.errors, left, double.gain(best.entries[-1]))
 
 
 def _look_ahead(

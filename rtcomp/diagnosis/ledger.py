@@ -58,6 +58,8 @@ class Ledger:
     """Effects of the believed stage beside its base."""
     memory: Memory = field(default_factory=Memory)
     """What ledgers of this stage and motion share."""
+    found_with_play: bool = False
+    """Whether the weights are those found with a play at work: then its load carries that friction."""
 
     def __post_init__(self) -> None:
         self.block = self.motion.block()
@@ -66,8 +68,6 @@ class Ledger:
         self.seen = np.ones(BLOCKS, dtype=np.bool_)
         self.seen[list(self.motion.unseen)] = False
         self.weights = believed_weights(self.stage, self.reaches)
-        self.found_with_play = False
-        """Whether the weights are those found with a play at work: then its load carries that friction."""
         self._plain: System | None = None
 
     def weigh(self, weights: Floats) -> None:
