@@ -119,7 +119,7 @@ def test_a_plant_with_another_axis(folder: Path) -> None:
         assert plant.stop()["zeroings"] == []  # it was never armed
 
 
-@pytest.mark.parametrize("force", [False, True])
+@pytest.mark.parametrize("force", [pytest.param(False, marks=pytest.mark.slow), True])
 @COMMANDS
 def test_a_plant_that_dies_while_running(folder: Path, command: str, force: bool) -> None:
     out = "results" if force else "new"

@@ -82,7 +82,7 @@ def helped(*command: str) -> str:
     return subprocess.run([RTCOMP, *command, "--help"], capture_output=True, text=True, check=True).stdout
 
 
-@pytest.mark.parametrize("what", SHORT)
+@pytest.mark.parametrize("what", [pytest.param("loop", marks=pytest.mark.slow), "link", "tick"])
 def test_every_example_is_accepted_as_written(what: str, tmp_path: Path) -> None:
     """Shortened, and with a plant in the place of a board."""
     examples = re.findall(rf"^ +rtcomp (bench {what}.*)$", helped("bench", what), re.MULTILINE)

@@ -28,6 +28,7 @@ def verdicts(text: str) -> dict[tuple[str, str], dict[str, object]]:
     return {(v["link"], v["what"]): v for v in json.loads(text)["verdicts"]}
 
 
+@pytest.mark.slow
 def test_serial_from_end_to_end(tmp_path: Path) -> None:
     run = rtcomp(
         "hil", shipped("leuven.yaml"), "--link", "serial", "--seconds", "3", "--fault", "kill",

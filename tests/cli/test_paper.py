@@ -21,6 +21,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return at
 
 
+@pytest.mark.slow
 def test_every_claim_has_a_verdict_and_a_number(made: Path) -> None:
     told = json.loads((made / "out" / "paper.json").read_text())
     assert told["format"] == "rtcomp paper 1" and told["recording"] is None
@@ -36,6 +37,7 @@ def test_every_claim_has_a_verdict_and_a_number(made: Path) -> None:
     assert len(re.findall(r" (?:true|false) ", printed)) >= len(names)
 
 
+@pytest.mark.slow
 def test_every_figure_is_on_the_page_beside_what_the_paper_reports(made: Path) -> None:
     told = json.loads((made / "out" / "paper.json").read_text())
     assert [figure["figure"] for figure in told["figures"]] == FIGURES
@@ -47,6 +49,7 @@ def test_every_figure_is_on_the_page_beside_what_the_paper_reports(made: Path) -
     assert str(made) not in page
 
 
+@pytest.mark.slow
 def test_an_earlier_result_stays_unless_forced(made: Path) -> None:
     refused("paper", "--quick", "--out", "out", at=made, says=["--force"])
 

@@ -133,7 +133,7 @@ def test_the_stop_file_stops_and_while_it_is_there_nothing_starts(tmp_path: Path
     assert [zeroing["cause"] for zeroing in log["zeroings"]] == ["disarmed"]
 
 
-@pytest.mark.parametrize("key", [b" ", b"\r"])
+@pytest.mark.parametrize("key", [b" ", pytest.param(b"\r", marks=pytest.mark.slow)])
 def test_a_key_is_an_emergency_stop(tmp_path: Path, key: bytes) -> None:
     """On a terminal of its own, which afterwards is as it was."""
     import pty

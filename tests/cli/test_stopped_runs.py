@@ -19,7 +19,9 @@ from rtcomp.hysteresis.model import HysteresisModel
 RESULTS = {
     ".rtcomp-files", "configuration.yaml", "model.yaml", "recording.h5", "report.html", "summary.json",
 }  # fmt: skip
-SIGNALS = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+SIGNALS = pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
+)
 
 
 def stop(run: Running, recording: str, number: int, rows: int = 400) -> subprocess.CompletedProcess[str]:

@@ -61,7 +61,7 @@ def test_an_emergency_stop_on_the_bus_ends_the_run_at_zero(axis):
         assert device.exchange(0.0).status == OK
 
 
-@pytest.mark.parametrize("dialect", c.DIALECTS)
+@pytest.mark.parametrize("dialect", ["0.6", pytest.param("0.5.6", marks=pytest.mark.slow)])
 def test_an_error_of_the_axis_ends_the_run_by_its_name(pty_axis, dialect):
     axis = pty_axis(dialect=dialect, watchdog=None)
     some = list(c.ERRORS[dialect].items())[:: 1 if dialect == "0.5.6" else 3]

@@ -59,7 +59,7 @@ def test_it_is_the_stage_of_the_file(stage_file, stage):
     assert summary["state"] == "IDLE"
 
 
-@pytest.mark.parametrize("moments", [3, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("moments", [2, pytest.param(100, marks=pytest.mark.slow)])
 def test_killed_or_stopped_at_any_moment_the_host_leaves_a_zero_output(stage_file, stage, moments):
     noise = random.Random(11)
     gone = []

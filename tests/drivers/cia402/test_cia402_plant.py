@@ -66,8 +66,8 @@ def test_no_thread_stands_beside_the_loop(plant, stage):
 @pytest.mark.parametrize(
     ("how", "times"),
     [
-        (signal.SIGKILL, 3),
-        (signal.SIGSTOP, 3),
+        (signal.SIGKILL, 1),
+        (signal.SIGSTOP, 1),
         pytest.param(signal.SIGKILL, 100, marks=pytest.mark.slow),
         pytest.param(signal.SIGSTOP, 100, marks=pytest.mark.slow),
     ],
