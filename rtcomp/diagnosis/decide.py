@@ -125,10 +125,10 @@ def decide(
         if current.errors.sum() < ABOVE_FLOOR * floor.sum() and not (looked_at and not entries) and not once:
             break
         explained = modelled((str(e["name"]) for e in entries), (c.gain for c in choices))
-        double = Double.of(stage, refined, motion) if entries else None
-        left = floor if double is None else np.maximum(floor, double.errors)
-        settled = bool(entries) and current.errors.sum() - floor.sum() < SETTLED * explained
-        if settled and not once and (double is None or current.errors.sum() < ELSE * left.sum()):
+        settled = bool(entries) and not once
+        settled &= bool(current.errors.sum() - floor.sum() < SETTLED * explained)
+        double = Double.of(stage, refined, motion, floor) if settled else None
+        if settled and (double is None or current.errors.sum() < ELSE * double.errors.sum()):
             break
         added = ahead or best_addition(stage, motion, current, entries, part_of(step), without)
         ahead = None
@@ -152,10 +152,10 @@ def decide(
         elif near and shapeless and not stands_out(current.errors, best.errors):
             break
         exact = sum(c.gain for c in choices) - explained
-        if entries:
-            before, after = current.errors, best.errors
-            weighs = not settled and settles_the_rest(explained, before, after, floor, shapeless, exact)
-            if not weighs and not _is_something_else(double, best, before, left):
+        before, after = current.errors, best.errors
+        if entries and (settled or not settles_the_rest(explained, before, after, floor, shapeless, exact)):
+            double = double or Double.of(stage, refined, motion, floor)
+            if shapeless or double is None or not _is_something_else(double, before, best):
                 break
         gained = float(current.errors.sum() - best.errors.sum())
         names, probability = alike(best, added.others, current, floor)
@@ -183,11 +183,9 @@ def _once(motion: Motion, current: Fitted, floor: Floats) -> bool:
     return bool(far[np.isin(seen, list(motion.jumped))].any())
 
 
-def _is_something_else(double: Double | None, best: Refined, before: Floats, left: Floats) -> bool:
+def _is_something_else(double: Double, before: Floats, best: Refined) -> bool:
     """Tell whether the last entry of `best` explains what the kernels of those before it do not leave."""
-    if double is None or last(best) in SHAPELESS:
-        return False
-    return is_something_else(before, best.errors, left, double.gain(best.entries[-1]))
+    return is_something_else(before, best.errors, double.errors, double.gain(best.entries[-1]))
 
 
 def _look_ahead(

@@ -31,14 +31,19 @@ FEW = 3
 
 @dataclass(frozen=True)
 class Double:
-    """A double with the same entries refined on it; `scale` brings its squared errors to the recording's."""
+    """A double with the same entries refined on it."""
 
     motion: Motion
     refined: Refined
     scale: float
+    """Factor that brings its squared errors to those of the recording."""
+    floor: Floats
+    """Squared error (N^2) of every seen block that noise and method leave without any entry."""
 
     @classmethod
-    def of(cls, stage: Stage, refined: Refined, motion: Motion, seed: int = 1) -> Double | None:
+    def of(
+        cls, stage: Stage, refined: Refined, motion: Motion, floor: Floats, seed: int = 1
+    ) -> Double | None:
         """Make the double of `stage` with `refined`; None where it cannot be simulated or analysed."""
         ledger = refined.fitted.ledger
         twin = double_of(extended_stage(stage, refined.fitted, refined.entries), motion, seed)
@@ -54,12 +59,12 @@ class Double:
             again = refine(around, twin, refined.entries, tries=FEW, searching=True)
         except (ConfigError, np.linalg.LinAlgError):
             return None
-        return cls(twin, again, believed_power(ledger) / believed_power(other))
+        return cls(twin, again, believed_power(ledger) / believed_power(other), floor)
 
     @property
     def errors(self) -> Floats:
         """Squared error (N^2) of every seen block that is left where the entries are all there is."""
-        return self.refined.errors * self.scale
+        return np.asarray(np.maximum(self.floor, self.refined.errors * self.scale))
 
     def gain(self, entry: Entry) -> float:
         """Return what `entry` gains (N^2) of that."""
@@ -68,7 +73,7 @@ class Double:
             further = refine(found.fitted, self.motion, [*found.entries, entry], tries=FEW, searching=True)
         except (ConfigError, np.linalg.LinAlgError):
             return 0.0
-        return max(float(self.errors.sum() - further.errors.sum() * self.scale), 0.0)
+        return max(float(found.errors.sum() - further.errors.sum()) * self.scale, 0.0)
 
 
 def double_of(stage: Stage, motion: Motion, seed: int) -> Motion | None:

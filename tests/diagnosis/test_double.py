@@ -18,6 +18,7 @@ from rtcomp.diagnosis.floor import floor_errors
 from rtcomp.diagnosis.motion import Motion, prepare
 from rtcomp.diagnosis.refine import Refined, refine
 from rtcomp.diagnosis.scene import Entry
+from rtcomp.kernels import Floats
 from rtcomp.stage.stage import Stage
 
 SHARP: Entry = {"name": "stribeck", "rise": 0.5, "velocity": 3e-4}
@@ -30,28 +31,28 @@ def coarse(effects: list[Entry]) -> Stage:
     return Stage.from_dict({**STAGE, "stage": mechanics, "sensor": {"noise": 6e-8, "resolution": 2e-7}})
 
 
-def explained(hidden: list[Entry]) -> tuple[Motion, Refined, float]:
+def explained(hidden: list[Entry]) -> tuple[Motion, Refined, Floats]:
     """A recording of the stage with `hidden` in it, the fit that has `SHARP`, and the floor of the base."""
     believed = coarse([])
     motion = prepare(believed, [run(coarse(hidden), reference(), seed=7)])
     base = fit_base(believed, motion)
     floor = floor_errors(extended_stage(believed, base, []), base, motion)
-    return motion, settle(believed, motion, refine(base, motion, [SHARP])), float(floor.sum())
+    return motion, settle(believed, motion, refine(base, motion, [SHARP])), floor
 
 
 def test_it_leaves_what_the_recording_leaves_though_kernels_leave_far_more_than_noise() -> None:
     motion, refined, floor = explained([SHARP])
-    double = Double.of(coarse([]), refined, motion)
+    double = Double.of(coarse([]), refined, motion, floor)
     assert double is not None
     assert double.errors.shape == refined.errors.shape
-    assert float(double.errors.sum()) > 2.0 * floor
+    assert float(double.errors.sum()) > 2.0 * float(floor.sum())
     assert 0.6 < float(double.errors.sum() / refined.errors.sum()) < 1.6
 
 
 @pytest.mark.parametrize("hidden", [[SHARP], [SHARP, DRIFT]], ids=["alone", "beside a drift"])
 def test_what_is_beyond_its_own_kernel_is_something_else(hidden: list[Entry]) -> None:
-    motion, refined, _ = explained(hidden)
-    double = Double.of(coarse([]), refined, motion)
+    motion, refined, floor = explained(hidden)
+    double = Double.of(coarse([]), refined, motion, floor)
     assert double is not None
     beside = settle(coarse([]), motion, refine(refined.fitted, motion, [*refined.entries, DRIFT]))
     chance = double.gain(beside.entries[-1])
@@ -61,9 +62,9 @@ def test_what_is_beyond_its_own_kernel_is_something_else(hidden: list[Entry]) ->
 
 
 def test_without_a_controller_there_is_none() -> None:
-    motion, refined, _ = explained([SHARP])
+    motion, refined, floor = explained([SHARP])
     data: dict[str, Any] = {k: v for k, v in STAGE.items() if k != "controller"}
-    assert Double.of(Stage.from_dict(data), refined, motion) is None
+    assert Double.of(Stage.from_dict(data), refined, motion, floor) is None
 
 
 def test_most_of_what_is_beyond_must_be_explained_and_more_than_by_chance() -> None:
