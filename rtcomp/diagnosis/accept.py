@@ -40,7 +40,7 @@ LEAST_BESIDE = 0.05
 """and part of what those before it explain,"""
 ALL = 0.85
 """unless it explains this part of all that is left: what is wrong with the first is not so well explained."""
-ELSE, SURPLUS, MOST = 1.2, 0.3, 0.7
+ELSE, SURPLUS, MOST = 1.2, 0.45, 0.7
 """Times what the kernels of those before it leave of them, above which something else may be left; times that
 and the part of what is beyond it that a further entry must gain to be that."""
 NOISE, STEADILY = 0.7, 0.4
