@@ -91,7 +91,7 @@ def _contacts(s: Scene, share: float) -> list[float]:
 
 def _inertial(s: Scene) -> list[Point]:
     mass = s.fitted.ledger.stage.mass
-    points: list[Entry] = [{"name": "inertia", "mass": mass * f} for f in (0.5, 0.75, 1.3, 1.8)]
+    points: list[Entry] = [{"name": "inertia", "mass": mass * f} for f in (0.5, 0.75, 0.87, 1.15, 1.3, 1.8)]
     for f in np.geomspace(4.0, 1.5 * s.motion.cut, 9):
         points += [
             {"name": "resonance", "frequency": float(f), "damping": z, "mass_ratio": r}
