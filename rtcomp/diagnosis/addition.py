@@ -201,7 +201,7 @@ def settle(
     # Where a recording says nothing of reaches, they would go further every time.
     near = tuple(sorted({1.0, *(min(max(scale, SCALES[0]), SCALES[-1]) for scale in beside)}))
     memory = refined.fitted.ledger.memory
-    base = fit_base(stage, motion, effects, scales or near, memory)
+    base = fit_base(stage, motion, effects, tuple(sorted({around, *(scales or near)})), memory)
     found = refine(base, motion, refined.entries, searching=True)
     for _ in range(AGREE):
         if _agrees(found):

@@ -21,6 +21,8 @@ BELIEVED = 0.12
 """How far off mass, viscous friction and micro-damping may be before that is a finding of its own."""
 SCALES = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.12, 1.25, 1.4, 1.6, 1.8)
 """Factors tried on the reaches of the friction grid."""
+FINER = (0.94, 0.97, 1.03, 1.06)
+"""Factors on the best of them that are tried next, where that is not the believed one."""
 RELEASED = {"asymmetric-viscous-friction": "viscous"}
 """Entries that say how a believed number differs by direction, so that it may not be what was believed."""
 FIXED = 3
@@ -107,3 +109,15 @@ def fit_base(
         return Fitted(ledger, system, bounds, system.blocks.left_out(ledger.seen, bounds), scale)
 
     return min(shared(at_scale, scales), key=lambda fitted: float(fitted.errors.sum()))
+
+
+def finer(stage: Stage, motion: Motion, base: Fitted) -> Fitted:
+    """Return `base` between the reaches that were tried, where other than the believed ones fit better.
+
+    What a coarse choice of them leaves looks like an effect.
+    """
+    if base.scale == 1.0:
+        return base
+    scales = tuple(base.scale * factor for factor in FINER)
+    between = fit_base(stage, motion, scales=scales, memory=base.ledger.memory)
+    return min(base, between, key=lambda fitted: float(fitted.errors.sum()))

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from rtcomp.diagnosis.accept import ABOVE_FLOOR
-from rtcomp.diagnosis.base import Fitted, fit_base
+from rtcomp.diagnosis.base import Fitted, finer, fit_base
 from rtcomp.diagnosis.by_position.sticking import MUCH, mostly_hidden
 from rtcomp.diagnosis.by_position.told import told_by_position
 from rtcomp.diagnosis.certain import birge, intervals, neighbours, retunings
@@ -77,7 +77,7 @@ def diagnose(
         part = float(np.linalg.norm(rough.residual) / max(float(np.linalg.norm(rough.system.y)), 1e-300))
         say(0.5, "balance")
         located(part, locate(motion, rough.residual, None, seed, stage.axis))
-    base = fit_base(stage, motion)
+    base = finer(stage, motion, fit_base(stage, motion))
     retuned_stage = extended_stage(stage, base, [])
     say(1.0, "balance")
     floor = floor_errors(retuned_stage, base, motion, seed + 1)

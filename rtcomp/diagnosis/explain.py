@@ -22,9 +22,8 @@ from rtcomp.kernels import Floats
 from rtcomp.stage.balance import force_balance
 from rtcomp.stage.stage import Stage
 
-NEGLIGIBLE, BENT = 0.0035, 1.0
-"""Relative force error up to which nothing is looked for, unless the base departs further than this from what
-is believed (see `departure`): it may have bent to an effect."""
+NEGLIGIBLE = 0.0035
+"""Relative force error up to which nothing is looked for."""
 CLEAR = 0.5
 """Part of the mismatch that depends on one axis, from which on it is looked into however small it is."""
 STRUCTURED = 0.3
@@ -77,7 +76,7 @@ def explain(
     clear = small and any(p.share > CLEAR for p in locate(motion, base.residual, None, seed))
     # And where it does not, an entry may still stand out: but that must be seen where nothing was fitted.
     faint = small and not clear
-    looked_at = clear or bool(base.errors.sum() > NEGLIGIBLE**2 * power) or departure(base) > BENT
+    looked_at = clear or bool(base.errors.sum() > NEGLIGIBLE**2 * power)
     without: frozenset[str] = frozenset()
     looks = []
     for _ in range(AGAIN + 1):
