@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtcomp.diagnosis.alike import ONE_THING, SHAPELESS, last, least_far, plainest
+from rtcomp.diagnosis.alike import ONE_THING, SHAPELESS, bounded, last, least_far, plainest
 from rtcomp.diagnosis.base import FIXED, SCALES, Fitted, fit_base
 from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.cores import shared
@@ -101,6 +101,7 @@ def best_addition(
             if float(current.errors.sum() - other.errors.sum()) > NEARLY * reduction:
                 best = other
                 break
+    best = bounded(best, tried, current)
     return Addition(best, [r for r in tried if r is not best], looked, gains)
 
 

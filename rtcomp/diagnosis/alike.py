@@ -70,6 +70,27 @@ def least_far(tried: Sequence[Refined], current: Fitted) -> Refined:
     return best
 
 
+def bounded(best: Refined, tried: Sequence[Refined], current: Fitted) -> Refined:
+    """Return `best`, or of those not told apart from it one whose force does not run away beyond the motion.
+
+    A spring that pushes outwards pushes without end; over less than a period, a wave does the same.
+    """
+    if not _runs_away(best):
+        return best
+    most = float(best.errors.sum())
+    most = min(APART * most, most + ALIKE * float(current.errors.sum() - most))
+    others = [r for r in tried if last(r) not in SHAPELESS and not _runs_away(r)]
+    return next((r for r in others if float(r.errors.sum()) <= most), best)
+
+
+def _runs_away(refined: Refined) -> bool:
+    """Tell whether the last entry is a spring that pushes outwards, somewhere."""
+    if last(refined) != "parallel-spring":
+        return False
+    entry = refined.entries[-1]
+    return any(float(entry[part]) < 0.0 for part in ("stiffness", "cubic"))  # type: ignore[arg-type]
+
+
 def _scales_little(refined: Refined) -> bool:
     """Tell whether the last entry scales all numbers by no more than each of them may be off anyway."""
     size = SCALES_ALL.get(last(refined))

@@ -40,7 +40,7 @@ from rtcomp.kernels import Floats
 from rtcomp.physics import catalogue
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
-from rtcomp.units import for_axis
+from rtcomp.units import for_axis, prefixed
 
 OPEN = 4.0
 """Squared error over the floor's, from which on something remains that no entry explains."""
@@ -48,6 +48,8 @@ LOUD = 0.03
 """Relative force error left by noise and method, from which on forces decide nothing where an axis sticks."""
 KEPT = 0.9
 """Factor on the held-out error below which a retuned stage is given in place of the believed one."""
+ALONG = ("parallel-spring", "position-force", "position-dependent-friction")
+"""Entries whose force beyond the recorded motion is a guess; waves and stops are bounded there."""
 ROUGH = (0.75, 1.0, 1.3)
 """Factors on the believed reaches with which the place of the mismatch is looked for at first."""
 
@@ -133,7 +135,7 @@ def diagnose(
         experiment,
         sights,
         _candidates(decision, base, sights),
-        [*_notes(motion, recordings), *flat],
+        [*_notes(motion, recordings), *_known_here(named, motion, stage.axis), *flat],
         motion.plain([s.time for s in motion.strips]),
         base.residual,
         final.residual,
@@ -266,3 +268,14 @@ def _notes(motion: Motion, recordings: Sequence[Recording]) -> list[str]:
     if motion.seconds * motion.rate < 0.9 * rows * motion.rate / recordings[0].rate_hz:
         notes.append(f"of {rows} rows, windows of {motion.seconds:.3g} s in all were looked at")
     return notes
+
+
+def _known_here(named: list[Entry], motion: Motion, axis: str) -> list[str]:
+    """Say of forces along the way where they are known: what leads beyond asks for what nobody has seen."""
+    along = [str(e["name"]) for e in named if e["name"] in ALONG]
+    if not along:
+        return []
+    (low, high), unit = prefixed(for_axis("m", axis), *motion.stroke)
+    return [
+        f"{' and '.join(along)}: known from {low} to {high} {unit}, where this motion went, and not beyond"
+    ]

@@ -9,13 +9,14 @@ import pytest
 from recorded import run
 from recorded import stage as axis
 
-from rtcomp.diagnosis.alike import last, least_far
+from rtcomp.diagnosis.alike import bounded, last, least_far
 from rtcomp.diagnosis.base import fit_base
 from rtcomp.diagnosis.certain import birge, intervals, neighbours
 from rtcomp.diagnosis.departure import USUAL, departure, off
 from rtcomp.diagnosis.diagnose import diagnose
 from rtcomp.diagnosis.motion import prepare
-from rtcomp.diagnosis.refine import refine
+from rtcomp.diagnosis.refine import Refined, refine
+from rtcomp.diagnosis.scene import Entry
 from rtcomp.kernels import Floats
 
 
@@ -106,3 +107,22 @@ def test_intervals_grow_with_what_is_left_and_with_what_the_grid_decides() -> No
     floor = refined.fitted.errors
     assert birge(refined.fitted, floor) == 1.0 and birge(refined.fitted, 4.0 * floor) == 1.0
     assert birge(refined.fitted, 0.25 * floor) == pytest.approx(2.0)
+
+
+def test_a_wave_that_does_as_well_comes_before_a_spring_that_pushes_outwards() -> None:
+    """Recorded over less than the wave's period; what the spring would do beyond has no end."""
+    believed = axis()
+    motion = prepare(believed, [run(believed, reference())])
+    base = fit_base(believed, motion)
+
+    def leaves(part: float, entry: Entry) -> Refined:
+        refined = refine(base, motion, [entry], tries=0)
+        return replace(refined, fitted=replace(refined.fitted, errors=part * base.errors))
+
+    outwards = leaves(0.05, {"name": "parallel-spring", "stiffness": -500.0, "cubic": 1e9})
+    inwards = leaves(0.05, {"name": "parallel-spring", "stiffness": 500.0, "cubic": 0.0})
+    wave: Entry = {"name": "cogging", "amplitude": 0.4, "period": 4e-3, "phase": np.pi}
+    near, far = leaves(0.06, wave), leaves(0.09, wave)
+    assert bounded(outwards, [outwards, near], base) is near
+    assert bounded(outwards, [outwards, far], base) is outwards
+    assert bounded(inwards, [inwards, near], base) is inwards

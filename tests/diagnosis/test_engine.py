@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rtcomp.diagnosis.diagnose import diagnose
+from rtcomp.diagnosis.diagnose import ALONG, diagnose
 from rtcomp.diagnosis.result import Diagnosis
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
@@ -88,7 +88,10 @@ def test_cogging_is_named_and_the_extended_stage_has_it(cogging: Diagnosis) -> N
     ids=lambda h: h["name"],
 )
 def test_what_was_hidden_is_named_and_the_extended_stage_has_it(hidden: dict[str, Any]) -> None:
-    check_named(diagnosed(hidden), hidden)
+    done = diagnosed(hidden)
+    check_named(done, hidden)
+    beyond = [note for note in done.notes if "and not beyond" in note]
+    assert [n.split(":")[0] for n in beyond] == ([hidden["name"]] if hidden["name"] in ALONG else [])
 
 
 def test_cogging_is_found_with_its_size_and_period(cogging: Diagnosis) -> None:
