@@ -25,6 +25,7 @@ from rtcomp.diagnosis.addition import Addition, Progress, best_addition, settle
 from rtcomp.diagnosis.alike import APART, ONE_THING, SHAPELESS, alike, last
 from rtcomp.diagnosis.base import Fitted
 from rtcomp.diagnosis.double import Double
+from rtcomp.diagnosis.look_ahead import SHAPED, look_ahead
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Refined, refine
 from rtcomp.diagnosis.scene import Entry
@@ -34,19 +35,11 @@ from rtcomp.stage.stage import Stage
 
 MOST = 4
 """Entries named at the most: beyond, a recording does not carry the decision."""
-RIVAL, HALF = 0.7, 0.3
-"""Part of the first entry's gain from which on another is tried in its place: in general, and in the place of
-a free curve,"""
-TOGETHER, SHAPED, SPARED = 0.6, 0.95, 1.25
-"""and the part of the error with the first and its second that the other and its own must not exceed: in
-general, in the place of a free curve, and there if they come down to the floor."""
-RIVALS, HOPELESS = 2, 100.0
-"""Others tried so at the most, and times the error with the first that they may leave alone."""
 ONCE = 4.0
 """Times the floor of its stretch that is left where the sensor may have jumped, from which on it is looked
 into."""
-DONE = 3.0
-"""Times the floor that two leave, below which no other two are tried."""
+CHANCE = 0.35
+"""Part of what an entry gains that it may gain on the double, where the level of the error shows little."""
 EXCHANGED = 0.93
 """Part of the error with one entry that must be left with another in its place, to take that one."""
 ENOUGH, POOR = 0.7, 0.5
@@ -137,12 +130,14 @@ def decide(
             contenders = [r for r in (added.best, *added.others) if r is not None]
             free_curve = next((r for r in contenders if last(r) in SHAPELESS), None)
             greedy = added.best
-            added, ahead = _look_ahead(stage, motion, current, added, floor, part_of(step), without)
+            added, ahead = look_ahead(stage, motion, current, added, floor, part_of(step), without)
+        near = step == 0 and bool(current.errors.sum() < NEAR * floor.sum())
+        if near:
+            added = _not_by_chance(added, current, Double.of(stage, refined, motion, floor))
         best = added.best
-        together = step == 0 and best is not greedy
+        together = step == 0 and best is not greedy and not near
         if best is None:
             break
-        near = step == 0 and current.errors.sum() < NEAR * floor.sum()
         shapeless = last(best) in SHAPELESS
         jumped = once and last(best) == "sensor-jump" and not _once(motion, best.fitted, floor)
         if not together and not jumped and not worth_it(current.errors, best.errors, floor):
@@ -183,84 +178,22 @@ def _once(motion: Motion, current: Fitted, floor: Floats) -> bool:
     return bool(far[np.isin(seen, list(motion.jumped))].any())
 
 
+def _not_by_chance(added: Addition, current: Fitted, double: Double | None) -> Addition:
+    """Return what was found but for entries that gain much of it on the double too, where nothing of them is.
+
+    Noise in what an entry goes by, command or position, is explained by the entry itself.
+    """
+    if added.best is None or double is None:
+        return added
+    found = [added.best, *added.others]
+    gains = [float(current.errors.sum() - r.errors.sum()) for r in found]
+    kept = [r for r, gain in zip(found, gains, strict=True) if double.gain(r.entries[-1]) < CHANCE * gain]
+    return replace(added, best=kept[0] if kept else None, others=kept[1:])
+
+
 def _is_something_else(double: Double, before: Floats, best: Refined) -> bool:
     """Tell whether the last entry of `best` explains what the kernels of those before it do not leave."""
     return is_something_else(before, best.errors, double.errors, double.gain(best.entries[-1]))
-
-
-def _look_ahead(
-    stage: Stage,
-    motion: Motion,
-    base: Fitted,
-    first: Addition,
-    floor: Floats,
-    progress: Progress,
-    without: frozenset[str],
-) -> tuple[Addition, Addition | None]:
-    """Return the first entry that does best with a second beside it, and that second where it was looked for.
-
-    Where two effects hide in each other the first one found had to do for both, and may be neither.
-    """
-    best = first.best
-    enough = ABOVE_FLOOR * float(floor.sum())
-    settled = best is not None and float(best.errors.sum()) < enough
-    # A free curve explains waves as well as waves do, and names nothing.
-    if best is None or (settled and last(best) not in SHAPELESS):
-        return first, None
-    gain = float(base.errors.sum() - best.errors.sum())
-    group = next((set(g) for g in ONE_THING if last(best) in g), {last(best)})
-    shapeless = last(best) in SHAPELESS
-    most = (1.0 - (HALF if shapeless else RIVAL)) * gain + float(best.errors.sum())
-    if not shapeless:
-        most = min(most, HOPELESS * float(best.errors.sum()))
-    rivals = [
-        r
-        for r in first.others
-        if last(r) not in group and last(r) not in SHAPELESS and float(r.errors.sum()) < most
-    ]
-    if not rivals or not worth_it(base.errors, best.errors, floor):
-        return first, None
-
-    def beside(one: Refined) -> Addition:
-        return best_addition(stage, motion, one.fitted, one.entries, progress, without)
-
-    done = DONE * float(floor.sum())
-    chosen, ahead, left = best, None, float(best.errors.sum())
-    asked = settled
-    if not asked and not shapeless:
-        ahead, asked = beside(best), True
-        left = float((ahead.best or best).errors.sum())
-    for rival in rivals[:RIVALS]:
-        if asked and left < done and last(chosen) not in SHAPELESS:
-            break
-        other = beside(rival)
-        both = other.best
-        if both is None or not worth_it(base.errors, both.errors, floor):
-            continue
-        alone = float(base.errors.sum() - rival.errors.sum())
-        told = modelled([last(rival)], [alone])
-        if not settles_the_rest(told, rival.errors, both.errors, floor, exact=alone - told):
-            continue
-        pair = float(both.errors.sum())
-        if not asked and not (pair < done and last(both) not in SHAPELESS):
-            # A free curve and what goes with it are asked for only where nothing with a name does for both.
-            ahead, asked = beside(best), True
-            left = float((ahead.best or best).errors.sum())
-        if pair < _most_left(last(chosen), last(both), left, enough if asked else done):
-            chosen, ahead, left, asked = rival, other, pair, True
-    if not asked:
-        ahead = beside(best)
-    others = [best, *(r for r in first.others if r is not chosen)] if chosen is not best else first.others
-    return replace(first, best=chosen, others=others), ahead
-
-
-def _most_left(chosen: str, second: str, left: float, enough: float) -> float:
-    """Return the error that another first entry must reach, with `second` beside it, to replace `chosen`.
-
-    A free curve gives way to a name that does nearly as well, but not to one that needs the curve beside it.
-    """
-    spares = chosen in SHAPELESS and second not in SHAPELESS
-    return max(SHAPED * left, min(enough, SPARED * left)) if spares else TOGETHER * left
 
 
 def _exchange(

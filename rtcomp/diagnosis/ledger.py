@@ -29,7 +29,7 @@ from rtcomp.stage.stage import Stage
 
 MASS, VISCOUS, MICRO, BIAS = "mass", "viscous", "micro_damping", "bias"
 BIASES = ("constant-force", "gravity", "drive-offset")
-GRID = 14
+GRID = 20
 """Reaches of the grid where the believed friction is not a short list of elements."""
 
 

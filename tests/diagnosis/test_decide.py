@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from rtcomp.diagnosis.accept import modelled, settles_the_rest, stands_out, worth_it
-from rtcomp.diagnosis.decide import ONCE, _most_left, _once
+from rtcomp.diagnosis.decide import ONCE, _once
 from rtcomp.diagnosis.explain import LEAST, MUCH, _explains_little, _holds, _leaves_much
+from rtcomp.diagnosis.look_ahead import most_left
 from rtcomp.diagnosis.result import Fit
 from rtcomp.kernels import Floats
 
@@ -124,7 +125,7 @@ def test_a_small_gain_counts_where_nearly_every_block_has_it() -> None:
 def test_a_free_curve_gives_way_to_a_name_unless_it_stays_beside_it(
     chosen: str, second: str, most: float
 ) -> None:
-    assert _most_left(chosen, second, 10.0, 1.0) == pytest.approx(most)
+    assert most_left(chosen, second, 10.0, 1.0) == pytest.approx(most)
 
 
 @pytest.mark.parametrize(
@@ -150,5 +151,5 @@ def test_a_stretch_in_which_the_sensor_jumped_is_looked_into_by_itself(
 
 
 def test_two_names_at_the_floor_replace_a_free_curve_that_leaves_nearly_as_much() -> None:
-    assert _most_left("position-force", "parallel-spring", 10.0, 11.0) == pytest.approx(11.0)
-    assert _most_left("position-force", "parallel-spring", 10.0, 20.0) == pytest.approx(12.5)
+    assert most_left("position-force", "parallel-spring", 10.0, 11.0) == pytest.approx(11.0)
+    assert most_left("position-force", "parallel-spring", 10.0, 20.0) == pytest.approx(12.5)
