@@ -134,6 +134,7 @@ def decide(
         near = step == 0 and bool(current.errors.sum() < NEAR * floor.sum())
         if near:
             added = _not_by_chance(added, current, Double.of(stage, refined, motion, floor))
+            ahead = None  # a second beside the first that may have gone
         best = added.best
         together = step == 0 and best is not greedy and not near
         if best is None:

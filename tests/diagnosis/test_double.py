@@ -10,8 +10,9 @@ from recorded import STAGE, run
 from test_alike import reference
 
 from rtcomp.diagnosis.accept import is_something_else
-from rtcomp.diagnosis.addition import settle
+from rtcomp.diagnosis.addition import Addition, settle
 from rtcomp.diagnosis.base import fit_base
+from rtcomp.diagnosis.decide import _not_by_chance
 from rtcomp.diagnosis.double import Double
 from rtcomp.diagnosis.extend import extended_stage
 from rtcomp.diagnosis.floor import floor_errors
@@ -73,3 +74,20 @@ def test_most_of_what_is_beyond_must_be_explained_and_more_than_by_chance() -> N
     assert not is_something_else(before, np.full(10, 2.0), left, 0.0)  # half of what is beyond
     assert not is_something_else(before, np.full(10, 1.2), left, 5.0)
     assert not is_something_else(np.full(10, 1.1), np.full(10, 0.95), left, 0.0)  # little beside what is left
+
+
+def test_what_gains_as_much_on_the_double_is_not_looked_at() -> None:
+    believed = coarse([])
+    motion = prepare(
+        believed, [run(coarse([{"name": "drive-deadband", "width": 0.03}]), reference(), seed=5)]
+    )
+    base = fit_base(believed, motion)
+    floor = floor_errors(extended_stage(believed, base, []), base, motion)
+    plain = refine(base, motion, [])
+    found = refine(base, motion, [{"name": "drive-deadband", "width": 0.02}])
+    looked = Addition(found, [found], [], {})
+    without = Double.of(believed, plain, motion, floor)
+    assert _not_by_chance(looked, base, without) == looked
+    with_it = Double(motion, plain, 1.0, floor)  # a double in which the drive is dead as well
+    assert _not_by_chance(looked, base, with_it) == Addition(None, [], [], {})
+    assert _not_by_chance(looked, base, None) is looked
