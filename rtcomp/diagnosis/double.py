@@ -46,7 +46,7 @@ class Double:
     ) -> Double | None:
         """Make the double of `stage` with `refined`; None where it cannot be simulated or analysed."""
         ledger = refined.fitted.ledger
-        twin = double_of(extended_stage(stage, refined.fitted, refined.entries), motion, seed)
+        twin = resimulated(extended_stage(stage, refined.fitted, refined.entries), motion, seed)
         if twin is None:
             return None
         plain = extended_stage(stage, refined.fitted, [])
@@ -76,7 +76,7 @@ class Double:
         return max(float(found.errors.sum() - further.errors.sum()) * self.scale, 0.0)
 
 
-def double_of(stage: Stage, motion: Motion, seed: int) -> Motion | None:
+def resimulated(stage: Stage, motion: Motion, seed: int) -> Motion | None:
     """Simulate `stage` along the recorded references; None where there is no reference or controller.
 
     At the rate of the recording, and averaged as it was: noise that is averaged is less, and a controller

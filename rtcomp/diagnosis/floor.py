@@ -14,7 +14,7 @@ import numpy as np
 from rtcomp.diagnosis.base import Fitted, bounds_of
 from rtcomp.diagnosis.blocks import Blocks
 from rtcomp.diagnosis.candidates import effect_of
-from rtcomp.diagnosis.double import double_of
+from rtcomp.diagnosis.double import resimulated
 from rtcomp.diagnosis.ledger import Ledger
 from rtcomp.diagnosis.motion import Motion, Strip, unstepped
 from rtcomp.stage.stage import Stage
@@ -25,7 +25,7 @@ METHOD = 0.0015
 
 def floor_errors(stage: Stage, fitted: Fitted, motion: Motion, seed: int = 1) -> np.ndarray:
     """Return the squared error (N^2) expected in every seen block if `stage` were the whole truth."""
-    twin = double_of(stage, motion, seed)
+    twin = resimulated(stage, motion, seed)
     ledger, seen = fitted.ledger, fitted.ledger.seen
     power = fitted.system.blocks.power[seen]
     method = METHOD**2 * power
