@@ -49,6 +49,9 @@ and it explains most of what is left."""
 DISTINCT, DOUBTLESS, MOST_BLOCKS = 0.2, 3.0, 0.75
 """Part of the error that an entry must explain where the level of it says nothing, standard errors of the
 logarithm of what it leaves of a block, and the part of the blocks that must gain."""
+MAINLY = 0.5
+"""That part where the error is so small that how contacts are modelled leaves as much: something that is not
+there explains up to a quarter of it."""
 SURE = 8.0
 """Standard errors of what it gains, in nearly all blocks, from which on it counts beside others as well."""
 
@@ -75,8 +78,10 @@ def worth_it(before: Floats, after: Floats, floor: Floats) -> bool:
     )
 
 
-def stands_out(before: Floats, after: Floats) -> bool:
+def stands_out(before: Floats, after: Floats, distinct: float = DISTINCT) -> bool:
     """Tell whether the step from `before` to `after` is no accident, wherever their level is.
+
+    It must be gone by the part `distinct` at least.
 
     A floor is only as good as the double that it comes from, and a level above it adds up all that is wrong
     in small. What has the shape of an entry is gone from nearly every block that was left out.
@@ -85,7 +90,7 @@ def stands_out(before: Floats, after: Floats) -> bool:
     ratio = np.log(np.maximum(before, 1e-300) / np.maximum(after, 1e-300))
     doubt = float(ratio.std(ddof=1) / np.sqrt(ratio.size))
     return (
-        float(gained.sum()) > DISTINCT * float(before.sum())
+        float(gained.sum()) > distinct * float(before.sum())
         and float(ratio.mean()) > DOUBTLESS * doubt
         and float(np.mean(gained > 0.05 * before)) >= MOST_BLOCKS
     )

@@ -12,6 +12,7 @@ from rtcomp.diagnosis.base import FIXED, SCALES, Fitted, fit_base
 from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.ledger import WHOLE
+from rtcomp.diagnosis.lengths import SCALE, beside, has_places
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Refined, refine
 from rtcomp.diagnosis.scene import Entry, Scene
@@ -128,9 +129,11 @@ def _quickly(current: Fitted, motion: Motion, entries: list[Entry], screened: Sc
     variants = [(v, screened.ground) for v in _variants(screened.entry, current.ledger.stage)]
     for variant, ground in [*variants, *((form.entry, form.ground) for form in screened.forms)]:
         try:
-            made = [*entries, variant]
-            # On another ground than the one that they were found on, those at work are others too.
-            which = None if ground else [len(entries)]
+            made = beside(entries, variant)
+            # On another ground than the one that they were found on, those at work are others too;
+            # and beside a scale of the sensor, they are elsewhere.
+            moved = ground is not None or (variant["name"] == SCALE and has_places(entries))
+            which = None if moved else [len(entries)]
             tried = refine(ground or current, motion, made, which, QUICK)
         except (ConfigError, np.linalg.LinAlgError):
             continue

@@ -12,6 +12,7 @@ import numpy as np
 
 from rtcomp.diagnosis.accept import (
     ABOVE_FLOOR,
+    DISTINCT,
     ELSE,
     NEAR,
     SETTLED,
@@ -25,6 +26,7 @@ from rtcomp.diagnosis.addition import Addition, Progress, best_addition, settle
 from rtcomp.diagnosis.alike import APART, ONE_THING, SHAPELESS, alike, last
 from rtcomp.diagnosis.base import Fitted
 from rtcomp.diagnosis.double import Double
+from rtcomp.diagnosis.lengths import left_out
 from rtcomp.diagnosis.look_ahead import SHAPED, look_ahead
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Refined, refine
@@ -90,12 +92,12 @@ def decide(
     floor: Floats,
     progress: Progress | None = None,
     without: frozenset[str] = frozenset(),
-    looked_at: bool = False,
+    distinct: float | None = None,
 ) -> Decision:
     """Name what is missing; `floor` is the squared error of every seen block if nothing were.
 
-    Names in `without` are not considered. With `looked_at` it is looked for whatever the floor says: an
-    entry may stand out of a level that does not.
+    Names in `without` are not considered. With `distinct` it is looked for whatever the floor says: an
+    entry may stand out of a level that does not, if it explains that part of it.
     """
     entries: list[Entry] = []
     choices: list[Choice] = []
@@ -115,7 +117,7 @@ def decide(
     free_curve: Refined | None = None
     for step in range(MOST):
         once = _once(motion, current, floor)
-        if current.errors.sum() < ABOVE_FLOOR * floor.sum() and not (looked_at and not entries) and not once:
+        if current.errors.sum() < ABOVE_FLOOR * floor.sum() and (distinct is None or entries) and not once:
             break
         explained = modelled((str(e["name"]) for e in entries), (c.gain for c in choices))
         settled = bool(entries) and not once
@@ -123,6 +125,7 @@ def decide(
         double = Double.of(stage, refined, motion, floor) if settled else None
         if settled and (double is None or current.errors.sum() < ELSE * double.errors.sum()):
             break
+        near = step == 0 and bool(current.errors.sum() < NEAR * floor.sum())
         added = ahead or best_addition(stage, motion, current, entries, part_of(step), without)
         ahead = None
         if step == 0:
@@ -130,11 +133,10 @@ def decide(
             contenders = [r for r in (added.best, *added.others) if r is not None]
             free_curve = next((r for r in contenders if last(r) in SHAPELESS), None)
             greedy = added.best
-            added, ahead = look_ahead(stage, motion, current, added, floor, part_of(step), without)
-        near = step == 0 and bool(current.errors.sum() < NEAR * floor.sum())
-        if near:
-            added = _not_by_chance(added, current, Double.of(stage, refined, motion, floor))
-            ahead = None  # a second beside the first that may have gone
+            if near:
+                added = _not_by_chance(added, current, Double.of(stage, refined, motion, floor))
+            else:
+                added, ahead = look_ahead(stage, motion, current, added, floor, part_of(step), without)
         best = added.best
         together = step == 0 and best is not greedy and not near
         if best is None:
@@ -142,10 +144,10 @@ def decide(
         shapeless = last(best) in SHAPELESS
         jumped = once and last(best) == "sensor-jump" and not _once(motion, best.fitted, floor)
         if not together and not jumped and not worth_it(current.errors, best.errors, floor):
-            if step > 0 or shapeless or not stands_out(current.errors, best.errors):
+            if step > 0 or shapeless or not stands_out(current.errors, best.errors, distinct or DISTINCT):
                 break
             decision.faint = True
-        elif near and shapeless and not stands_out(current.errors, best.errors):
+        elif near and shapeless and not stands_out(current.errors, best.errors, distinct or DISTINCT):
             break
         exact = sum(c.gain for c in choices) - explained
         before, after = current.errors, best.errors
@@ -211,7 +213,7 @@ def _exchange(
     for at in range(len(choices)):
         if as_found and at == len(choices) - 1:
             break  # it was found beside these others
-        others = [e for i, e in enumerate(refined.entries) if i != at]
+        others = left_out(refined.entries, at)
         fewer = settle(stage, motion, refine(refined.fitted, motion, others, tries=3))
         added = best_addition(stage, motion, fewer.fitted, fewer.entries, progress, without)
         best = added.best
@@ -263,8 +265,7 @@ def _prune(
     kept, chosen = refined, list(choices)
     at = 0
     while len(kept.entries) > 1 and at < len(kept.entries):
-        without = [e for i, e in enumerate(kept.entries) if i != at]
-        fewer = settle(stage, motion, refine(kept.fitted, motion, without, tries=3))
+        fewer = settle(stage, motion, refine(kept.fitted, motion, left_out(kept.entries, at), tries=3))
         if worth_it(fewer.errors, kept.errors, floor):
             at += 1
         else:

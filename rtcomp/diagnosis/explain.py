@@ -6,24 +6,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtcomp.diagnosis.accept import ABOVE_FLOOR
+from rtcomp.diagnosis.accept import ABOVE_FLOOR, DISTINCT, MAINLY
 from rtcomp.diagnosis.addition import Progress
 from rtcomp.diagnosis.alike import SHAPELESS
 from rtcomp.diagnosis.base import Fitted
 from rtcomp.diagnosis.decide import Choice, Decision, decide
 from rtcomp.diagnosis.departure import departure
 from rtcomp.diagnosis.extend import extended_stage
+from rtcomp.diagnosis.held_out import HeldOut
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import consistent
 from rtcomp.diagnosis.result import Fit
 from rtcomp.diagnosis.scene import Entry
 from rtcomp.kernels import Floats
-from rtcomp.stage.balance import force_balance
 from rtcomp.stage.stage import Stage
 
 NEGLIGIBLE = 0.0035
-"""Relative force error up to which nothing is looked for."""
+"""Relative force error up to which only what explains most of it is looked for."""
 CLEAR = 0.5
 """Part of the mismatch that depends on one axis, from which on it is looked into however small it is."""
 STRUCTURED = 0.3
@@ -35,7 +35,8 @@ LEAST, MUCH, OPEN = 0.35, 0.7, 0.2
 """Part of the held-out squared error above the floor that names with a shape of their own must explain: in
 general, and where they leave more than the part OPEN of the mismatch that was seen."""
 CONFIRMED = 0.92
-"""Factor to which a name must bring the held-out error where the level of the error shows nothing."""
+"""Factor to which a name must bring the held-out error, in all or in the typical block, where the level of
+the error shows nothing."""
 AGREES = 0.006
 """Relative force error up to which a recording is held to agree, whatever its noise promises."""
 FAR, NEARLY_ALL = 4.0, 0.97
@@ -68,7 +69,7 @@ def explain(
     `floor` and `least` are squared errors (N^2) of seen blocks: left by noise and method, and worth a look.
     """
     retuned = extended_stage(stage, base, [])
-    before, plain = _held_out(stage, motion), _held_out(retuned, motion)
+    before, plain = HeldOut.of(stage, motion).error, HeldOut.of(retuned, motion)
     power = float(base.system.blocks.power[base.ledger.seen].sum())
     rest = float(np.sqrt(floor.sum() / power))
     # A floor is an expectation: where most of what is left hangs on one thing, it is no noise.
@@ -76,11 +77,13 @@ def explain(
     clear = small and any(p.share > CLEAR for p in locate(motion, base.residual, None, seed))
     # And where it does not, an entry may still stand out: but that must be seen where nothing was fitted.
     faint = small and not clear
-    looked_at = clear or bool(base.errors.sum() > NEGLIGIBLE**2 * power)
+    distinct = DISTINCT if clear or bool(base.errors.sum() > NEGLIGIBLE**2 * power) else None
+    if distinct is None and base.errors.sum() > ABOVE_FLOOR * floor.sum():
+        distinct = MAINLY
     without: frozenset[str] = frozenset()
     looks = []
     for _ in range(AGAIN + 1):
-        decision = decide(stage, motion, base, least, say, without, looked_at)
+        decision = decide(stage, motion, base, least, say, without, distinct)
         looks.append((decision.first_look, decision.first_refined))
         decision.first_look, decision.first_refined = looks[0]
         decision.refined = consistent(decision.refined)
@@ -95,30 +98,35 @@ def explain(
         entries = [dict(e) for e in decision.refined.entries]
         first = str(entries[0]["name"])
         named, own, decision.choices = _fold(stage, final, entries, decision.choices)
-        fit = Fit(before, plain, _held_out(own, motion), rest)
+        held = HeldOut.of(own, motion)
+        typical = held.typically(plain)
+        fit = Fit(before, plain.error, held.error, rest)
         shaped = any(str(e["name"]) not in SHAPELESS for e in entries)
         least_part = MUCH if decision.left(floor) > OPEN else LEAST
         strays = shaped and departure(final) > 1.5 * departure(base) + STRAYED
         little = shaped and (_explains_little(fit, least_part) or (len(named) == 1 and _leaves_much(fit)))
-        little = little or ((faint or decision.faint) and fit.after > CONFIRMED * fit.retuned)
+        if faint or decision.faint:
+            # Where the level shows nothing, whatever else is in one block is as large as the name.
+            little = typical > CONFIRMED and (little or fit.after > CONFIRMED * fit.retuned)
         once = any(e["name"] == "sensor-jump" for e in named)
-        if not named or (_holds(fit, once) and not strays and not little):
+        if not named or (_holds(fit, typical, once) and not strays and not little):
             return Explanation(decision, named, entries, own, final, fit)
         without |= {first}
     # What the ledger gains must hold in the stage itself; else it is not offered as an explanation.
     decision.choices = []
-    return Explanation(decision, [], [], retuned, base, Fit(before, plain, plain, rest))
+    return Explanation(decision, [], [], retuned, base, Fit(before, plain.error, plain.error, rest))
 
 
-def _holds(fit: Fit, once: bool = False) -> bool:
+def _holds(fit: Fit, typical: float = 1.0, once: bool = False) -> bool:
     """Tell whether names hold on what was put aside: they do no harm there, and help where there is need.
 
-    What happens `once` happens in no block that is put aside; there it can only harm, and may by a little.
+    There, or in the `typical` block of it (error over that of the retuned stage). What happens `once`
+    happens in no block that is put aside; there it can only harm, and may by a little.
     """
     much = max(1.5 * fit.floor, AGREES if once else 0.0)
     if fit.after > max(HARM * fit.before, much) or fit.after > max(WORSE * fit.retuned, much):
         return False
-    return fit.retuned < much or fit.after < HELP * fit.retuned
+    return fit.retuned < much or fit.after < HELP * fit.retuned or typical < HELP
 
 
 def _explains_little(fit: Fit, least: float) -> bool:
@@ -130,22 +138,6 @@ def _explains_little(fit: Fit, least: float) -> bool:
 def _leaves_much(fit: Fit) -> bool:
     """Tell whether far more than noise is left of what was put aside, and more than trimming explains."""
     return fit.after > FAR * fit.floor and _explains_little(fit, NEARLY_ALL)
-
-
-def _held_out(stage: Stage, motion: Motion) -> float:
-    """Return the relative force error of a whole stage on what nothing was fitted to or chosen by."""
-    off = over = 0.0
-    block, aside = motion.block(), motion.unseen
-    start = 0
-    for strip in motion.strips:
-        balance = force_balance(stage, strip.time, strip.position, strip.voltage, motion.cut)
-        rows = motion.kept(strip)
-        drive, needed = balance.force_drive[rows], balance.force_motion[rows]
-        unseen = np.isin(block[start : start + drive.size], aside)
-        start += drive.size
-        off += float(np.sum((drive - needed)[unseen] ** 2))
-        over += float(np.sum(needed[unseen] ** 2))
-    return float(np.sqrt(off / over)) if over > 0 else 0.0
 
 
 EVEN = 0.01

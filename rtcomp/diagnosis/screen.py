@@ -11,11 +11,11 @@ from rtcomp.diagnosis.base import Fitted, fit_base
 from rtcomp.diagnosis.candidates import effect_of, searches
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.ledger import WHOLE, Ledger, System
+from rtcomp.diagnosis.lengths import beside
 from rtcomp.diagnosis.scene import Column, Entry, Point, Scene
 from rtcomp.diagnosis.search_at_work import at_work
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
-from rtcomp.physics import Effect
 
 SIZES = {
     "asymmetric-friction": "asymmetry", "creep": "fraction", "drive-deadband": "width",
@@ -60,9 +60,8 @@ def screen(
     # An entry that shrinks the drive side shrinks every error; all are stated for the believed drive.
     power = float(fitted.system.blocks.power[fitted.ledger.seen].sum())
     best: dict[tuple[object, ...], Screened] = {}
-    others = [effect_of(e) for e in effects]
-    at_hand = shared(lambda search: _tried(fitted, others, power, search), searches(scene), progress)
-    for one in (*at_hand, *_as_believed(scene, others, power)):
+    at_hand = shared(lambda search: _tried(fitted, effects, power, search), searches(scene), progress)
+    for one in (*at_hand, *_as_believed(scene, effects, power)):
         if one is not None:
             _keep(best, one)
     first: dict[str, Screened] = {}
@@ -73,7 +72,7 @@ def screen(
     return list(first.values())
 
 
-def _tried(fitted: Fitted, others: list[Effect], power: float, search: Column | Point) -> Screened | None:
+def _tried(fitted: Fitted, others: list[Entry], power: float, search: Column | Point) -> Screened | None:
     """Try one search beside `others`; None where it cannot be evaluated."""
     ledger, seen = fitted.ledger, fitted.ledger.seen
     if isinstance(search, Column):
@@ -85,7 +84,7 @@ def _tried(fitted: Fitted, others: list[Effect], power: float, search: Column | 
     else:
         entry = search.entry
         try:
-            system = ledger.system([*others, effect_of(entry)])
+            system = ledger.system([effect_of(e) for e in beside(others, entry)])
         except ConfigError:
             return None
         scale = power / max(float(system.blocks.power[seen].sum()), 1e-300)
@@ -104,7 +103,7 @@ def _keep(best: dict[tuple[object, ...], Screened], one: Screened) -> None:
         best[key] = one
 
 
-def _as_believed(scene: Scene, others: list[Effect], power: float) -> list[Screened | None]:
+def _as_believed(scene: Scene, others: list[Entry], power: float) -> list[Screened | None]:
     """Try what other reaches do much of on the believed ones, where those of the base have gone elsewhere."""
     ledger = scene.fitted.ledger
     if 1.0 / BENT < scene.fitted.scale < BENT:
@@ -112,7 +111,7 @@ def _as_believed(scene: Scene, others: list[Effect], power: float) -> list[Scree
 
     def tried(point: Point) -> Screened | None:
         try:
-            effects = [*others, effect_of(point.entry)]
+            effects = [effect_of(e) for e in beside(others, point.entry)]
             own = fit_base(ledger.stage, scene.motion, effects, (1.0,), ledger.memory)
         except ConfigError:
             return None

@@ -21,6 +21,10 @@ BACK = 0.5
 ANSWERED = 12.0
 ANSWER = 4
 """Rows for which a controller is taken to answer a step."""
+LAW = 5
+"""Newest readings that a command is taken to answer at once, in proportion,"""
+LAWFUL = 0.25
+"""and the part of what is sudden in it that such an answer may leave."""
 COUNTS = 4.5
 """An outlier is further off than this many of the sensor's counts, however quiet the signal."""
 
@@ -74,6 +78,49 @@ def answers(position: Floats) -> npt.NDArray[np.bool_]:
     found = stepped.copy()
     for late in range(1, ANSWER + 1):
         found[late:] |= stepped[:-late]
+    return found
+
+
+def lawful(command: Floats, position: Floats, marked: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Return those of the `marked` rows whose `command` is what a linear controller made of the readings.
+
+    A controller that differentiates a coarse encoder kicks at every count: these commands were really given.
+    What is sudden in the command is regressed on what is sudden in the last LAW readings, over the whole
+    recording; a row that this explains is no outlier.
+    """
+    if len(command) < SPREAD_WINDOW:
+        return np.zeros_like(marked)
+    gram, with_command = np.zeros((LAW, LAW)), np.zeros(LAW)
+    for rows, volts in zip(sample(position), sample(command), strict=True):
+        edge = slice(LAW, len(rows) - LAW)
+        readings = _readings(_sudden(rows), np.arange(len(rows))[edge])
+        gram += readings.T @ readings
+        with_command += readings.T @ _sudden(volts)[edge]
+    law = np.linalg.lstsq(gram, with_command, rcond=1e-12)[0]
+    found = np.zeros_like(marked)
+    for piece in pieces(len(command)):
+        at = np.flatnonzero(marked[piece])
+        if not len(at):
+            continue
+        begin = max(piece.start - REACH, 0)
+        near = slice(begin, piece.stop + REACH)
+        at += piece.start - begin
+        sudden = _sudden(command[near])[at]
+        left = np.abs(sudden - _readings(_sudden(position[near]), at) @ law)
+        found[at + begin] = left < LAWFUL * np.abs(sudden)
+    return found
+
+
+def _readings(sudden: Floats, at: npt.NDArray[np.intp]) -> Floats:
+    """Return of the rows `at` the newest LAW values of `sudden`, (rows, LAW)."""
+    return np.asarray(sudden[np.maximum(at[:, np.newaxis] - np.arange(LAW), 0)])
+
+
+def _sudden(signal: Floats) -> Floats:
+    """Return what no cubic through two neighbours on either side explains of each row; 0 at the ends."""
+    found = np.zeros_like(signal)
+    beside, beyond = signal[1:-3] + signal[3:-1], signal[:-4] + signal[4:]
+    found[2:-2] = signal[2:-2] - (4.0 * beside - beyond) / 6.0
     return found
 
 

@@ -292,7 +292,7 @@ def _even(
 
 
 def _marked(columns: Mapping[str, Floats], notes: list[str]) -> npt.NDArray[np.bool_]:
-    from rtcomp.recording.outliers import COMMAND_THRESHOLD, THRESHOLD, answers, outliers
+    from rtcomp.recording.outliers import COMMAND_THRESHOLD, THRESHOLD, answers, lawful, outliers
 
     marked = np.zeros(len(columns["time"]), dtype=np.bool_)
     for name, threshold in (("position", THRESHOLD), ("voltage", COMMAND_THRESHOLD)):
@@ -300,6 +300,7 @@ def _marked(columns: Mapping[str, Floats], notes: list[str]) -> npt.NDArray[np.b
             found = outliers(columns[name], threshold)
             if name == "voltage" and found.any():
                 found &= ~answers(columns["position"])
+                found &= ~lawful(columns["voltage"], columns["position"], found)
             marked |= found
             if found.any():
                 at = columns["time"][int(np.argmax(found))]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rtcomp.diagnosis.accept import modelled, settles_the_rest, stands_out, worth_it
+from rtcomp.diagnosis.accept import MAINLY, modelled, settles_the_rest, stands_out, worth_it
 from rtcomp.diagnosis.decide import ONCE, _once
 from rtcomp.diagnosis.explain import LEAST, MUCH, _explains_little, _holds, _leaves_much
 from rtcomp.diagnosis.look_ahead import most_left
@@ -77,6 +77,7 @@ def test_an_entry_stands_out_by_what_is_gone_from_the_blocks_not_by_their_level(
     chance = np.random.default_rng(7).uniform(0.98, 1.02, BLOCKS)
     after = quiet_and_loud * np.where(np.arange(BLOCKS) >= BLOCKS - blocks, 1.0 - part, 1.0) * chance
     assert stands_out(quiet_and_loud, after) is does
+    assert not stands_out(quiet_and_loud, after, MAINLY)
 
 
 def test_names_that_leave_much_must_explain_most_of_what_was_put_aside() -> None:
@@ -104,6 +105,12 @@ def test_what_happens_once_may_harm_a_little_where_it_does_not_happen() -> None:
     slightly_worse = Fit(0.0017, 0.0072, 0.0030, 0.0015)
     assert _holds(slightly_worse, once=True) and not _holds(slightly_worse)
     assert not _holds(Fit(0.0017, 0.0072, 0.0120, 0.0015), once=True)
+
+
+def test_what_helps_in_the_typical_block_holds_though_one_block_hides_it() -> None:
+    hidden_in_one = Fit(0.0048, 0.0046, 0.00456, 0.0018)
+    assert not _holds(hidden_in_one)
+    assert _holds(hidden_in_one, typical=0.84)
 
 
 def test_a_small_gain_counts_where_nearly_every_block_has_it() -> None:

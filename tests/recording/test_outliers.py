@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from recording_files import motion, write_hdf5
 
+from rtcomp.recording.outliers import COMMAND_THRESHOLD, lawful, outliers
 from rtcomp.recording.reader import read
 
 
@@ -35,3 +37,54 @@ def test_steps_and_fast_oscillations_are_no_outliers(tmp_path: Path) -> None:
     columns["position"] += 1e-4 * burst
     columns["voltage"] = 5.0 * np.sign(np.sin(2 * np.pi * 7 * columns["time"] + 0.1))
     assert "outlier" not in read(write_hdf5(tmp_path / "a.h5", columns)).columns
+
+
+def driven(gains: tuple[float, float, float], count: float, rate: float) -> dict[str, np.ndarray]:
+    """A controller's answers, kicks included, to an axis read in counts."""
+    time = np.arange(4000) / rate
+    slow = 0.15 * count * rate  # a count every seven rows
+    reference = 1e-4 * np.sin(slow / 1e-4 * time)
+    noise = 0.02 * count * np.random.default_rng(3).standard_normal(time.size)
+    position = np.round((np.roll(reference, 4) + noise) / count) * count
+    position[:4] = 0.0
+    error = reference - position
+    kp, ki, kd = gains
+    voltage = kp * error + ki * np.cumsum(error) / rate + kd * np.diff(error, prepend=0.0) * rate
+    return {"time": time, "reference": reference, "position": position, "voltage": voltage}
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    st.tuples(st.floats(1e3, 1e4), st.floats(0.0, 1e5), st.floats(5.0, 100.0)),
+    st.sampled_from([1e-7, 5e-7, 2e-6]),
+    st.sampled_from([500.0, 2000.0]),
+    st.integers(1000, 3000),
+)
+def test_kicks_of_a_controller_at_counts_of_its_sensor_are_no_outliers(
+    gains: tuple[float, float, float], count: float, rate: float, row: int
+) -> None:
+    columns = driven(gains, count, rate)
+    found = outliers(columns["voltage"], COMMAND_THRESHOLD)
+    assert not (found & ~lawful(columns["voltage"], columns["position"], found)).any()
+    wrong = columns["voltage"].copy()
+    wrong[row] += 20.0 * np.ptp(wrong)
+    found = outliers(wrong, COMMAND_THRESHOLD)
+    left = np.flatnonzero(found & ~lawful(wrong, columns["position"], found))
+    assert row in left and np.all(np.abs(left - row) <= 2)  # a kick beside it looks as wrong
+
+
+def test_the_recording_keeps_them(tmp_path: Path) -> None:
+    columns = driven((3e3, 2e4, 23.0), 1e-6, 1000.0)
+    assert outliers(columns["voltage"], COMMAND_THRESHOLD).any()
+    assert "outlier" not in read(write_hdf5(tmp_path / "a.h5", columns)).columns
+
+
+def test_a_long_recording_is_looked_at_piece_by_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+    columns = driven((3e3, 2e4, 23.0), 1e-6, 1000.0)
+    wrong = columns["voltage"].copy()
+    wrong[[500, 1023, 1024, 3990]] += 20.0 * np.ptp(wrong)
+    found = outliers(wrong, COMMAND_THRESHOLD)
+    whole = lawful(wrong, columns["position"], found)
+    monkeypatch.setattr("rtcomp.recording.pieces.PIECE", 1024)
+    assert np.array_equal(lawful(wrong, columns["position"], found), whole)
+    assert {500, 1023, 1024, 3990} <= set(np.flatnonzero(found & ~whole)) <= {499, 500, 1023, 1024, 3990}
