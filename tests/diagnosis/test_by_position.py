@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rtcomp.diagnosis.by_position.decide import worth_it
+from rtcomp.diagnosis.by_position.decide import Judge, Judged, Step, Verdicts, drop, worth_it
 from rtcomp.diagnosis.by_position.sticking import MUCH, hidden, mostly_hidden
+from rtcomp.diagnosis.by_position.told import unsure
 from rtcomp.diagnosis.by_position.turning import Setting, fit
 from rtcomp.diagnosis.by_position.windows import windows_of
 from rtcomp.diagnosis.diagnose import diagnose
@@ -133,6 +134,38 @@ def test_what_helps_in_one_block_only_is_an_accident() -> None:
     assert worth_it(before, always) and not worth_it(before, once)
 
 
+@pytest.mark.parametrize(
+    ("halves", "at"),
+    [
+        ({}, None),
+        ({(1, "rise"): 0.9}, None),
+        ({(1, "rise"): 1.1}, 1),  # from less than nothing to twice as much
+        ({(0, "coefficient"): 3.0, (0, "external"): 3.0}, None),  # by a factor: never nothing
+        ({(1, "velocity"): 3.0}, None),  # how it looks is not known; that it is there is
+        ({(1, "rise"): 1.1, (2, "amplitude"): 2.0}, 2),  # the last found goes first
+    ],
+)
+def test_an_entry_whose_size_is_not_told_from_none_goes(
+    halves: dict[tuple[int, str], float], at: int | None
+) -> None:
+    entries = (
+        LOAD,
+        {"name": "stribeck", "rise": 0.5, "velocity": 0.3},
+        {"name": "cogging", "amplitude": 0.02, "period": 1.1, "phase": 0.3},
+    )
+    judged = Judged(Setting(stage(), {}, entries), 1.0, np.ones(BLOCKS))
+    assert unsure(Verdicts(judged, judged), halves) == at
+
+
+def test_the_last_entry_that_goes_leaves_the_refitted_belief(loaded: list[Recording]) -> None:
+    windows = windows_of(loaded, CUT)
+    base = Judged(Setting(stage(), {}, ()), 2.0, np.full(BLOCKS, 0.2))
+    best = Judged(Setting(stage(), {}, (LOAD,)), 1.0, np.full(BLOCKS, 0.1))
+    found = Verdicts(base, best, [Step(["load-dependent-friction"], 1.0, 1.0)])
+    drop(Judge(windows, 0.02), found, 0)
+    assert found.best is base and not found.steps
+
+
 @pytest.mark.slow
 def test_friction_that_grows_with_the_load_is_named_and_nothing_else(loaded: list[Recording]) -> None:
     done = diagnose(stage(), loaded)
@@ -177,3 +210,4 @@ def test_a_measured_servo_is_predicted_at_a_gain_that_was_not_looked_at(
     assert done.retuned_stage is not None
     retuned, extended = (np.abs(windows.off(s)).mean() for s in (done.retuned_stage, done.stage))
     assert extended < retuned / 1.5
+    assert "stribeck" not in {name for e in done.effects for name in e.names}  # nearly none, or thrice

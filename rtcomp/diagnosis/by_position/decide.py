@@ -249,14 +249,25 @@ def _prune(judge: Judge, found: Verdicts) -> None:
     """Delete every entry that the others make needless."""
     at = 0
     while len(found.best.setting.entries) > 1 and at < len(found.best.setting.entries):
-        setting = found.best.setting
-        without = tuple(e for i, e in enumerate(setting.entries) if i != at)
-        fewer = judge.judged(_released(setting.having(without), found.base.setting))
+        fewer = _fewer(judge, found, at)
         if worth_it(fewer.outside, found.best.outside):
             at += 1
         else:
             found.best = fewer
             del found.steps[at]
+
+
+def drop(judge: Judge, found: Verdicts, at: int) -> None:
+    """Take the entry at place `at` back, and fit the others without it."""
+    found.best = _fewer(judge, found, at) if len(found.steps) > 1 else found.base
+    del found.steps[at]
+
+
+def _fewer(judge: Judge, found: Verdicts, at: int) -> Judged:
+    """Return the best fit without the entry at place `at`."""
+    setting = found.best.setting
+    without = tuple(e for i, e in enumerate(setting.entries) if i != at)
+    return judge.judged(_released(setting.having(without), found.base.setting))
 
 
 def starts(scene: Scene, longest: float = np.inf) -> dict[str, list[Entry]]:

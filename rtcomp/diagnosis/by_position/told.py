@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rtcomp.diagnosis.base import Fitted
-from rtcomp.diagnosis.by_position.decide import Judge, Verdicts, decide, scale_of
+from rtcomp.diagnosis.by_position.decide import Judge, Verdicts, decide, drop, scale_of
 from rtcomp.diagnosis.by_position.sticking import count_of, hidden
 from rtcomp.diagnosis.by_position.turning import Knob, Setting, fit, robust
 from rtcomp.diagnosis.by_position.windows import Windows, windows_of
@@ -56,19 +56,23 @@ def told_by_position(
     low, high = motion.stroke
     believed = Setting(stage, {}, (), LONGEST * (high - low))
     decided = decide(Scene.of(motion, base), believed, windows, say, seed)
+    halves = _halves(decided, believed, windows)
+    while (at := unsure(decided, halves)) is not None:
+        drop(Judge(windows, scale_of(believed, windows)), decided, at)
+        halves = _halves(decided, believed, windows)
     say(0.2, "judge")
     extended, retuned_stage = decided.best.setting.stage(), decided.base.setting.stage()
     errors = _position(stage, retuned_stage, extended, windows, motion.cut, seed)
     if decided.steps and errors.after > 1.02 * min(errors.before, errors.retuned):
         # What is gained on the windows seen must hold on the others; else it is no explanation.
         decided.best, decided.steps = decided.base, []
+        halves = _halves(decided, believed, windows)
         extended = retuned_stage
         errors = _position(stage, retuned_stage, extended, windows, motion.cut, seed)
     if not decided.steps and errors.before <= errors.after:
         extended = stage
         errors = _position(stage, retuned_stage, extended, windows, motion.cut, seed)
     say(0.6, "judge")
-    halves = _halves(decided, believed, windows)
     effects = _effects(decided, halves)
     verdict = _verdict(decided, effects, errors)
     if verdict == "unexplained":
@@ -108,6 +112,24 @@ def told_by_position(
         position=errors,
         retuned_stage=retuned_stage,
     )
+
+
+def unsure(decided: Verdicts, halves: dict[tuple[int, str], float]) -> int | None:
+    """Return which entry's size is not told from none, the last found first; None where all are.
+
+    Over short windows such a one may end closer by chance; in closed loop it need not be small.
+    """
+    knobs = {(k.entry, k.name): k for k in decided.best.setting.knobs()}
+    for at, entry in reversed(list(enumerate(decided.best.setting.entries))):
+        sizes = catalogue.entry(str(entry["name"])).neutral or {}
+        spans = []
+        for name, nothing in sizes.items():
+            if isinstance(entry.get(name), int | float) and (at, name) in knobs:
+                low, high = _interval(float(entry[name]), knobs[at, name], halves.get((at, name), 0.0))  # type: ignore[arg-type]
+                spans.append(low <= nothing <= high)
+        if spans and all(spans):
+            return at
+    return None
 
 
 def _position(
