@@ -10,6 +10,7 @@ import numpy as np
 
 from rtcomp.diagnosis.accept import ABOVE_FLOOR
 from rtcomp.diagnosis.base import Fitted, finer, fit_base
+from rtcomp.diagnosis.believed_effects import numbers_moved, other_numbers
 from rtcomp.diagnosis.by_position.sticking import MUCH, mostly_hidden
 from rtcomp.diagnosis.by_position.told import told_by_position
 from rtcomp.diagnosis.certain import birge, intervals, neighbours, retunings
@@ -19,6 +20,7 @@ from rtcomp.diagnosis.experiment import next_experiment
 from rtcomp.diagnosis.explain import AGREES, NEGLIGIBLE, explain
 from rtcomp.diagnosis.extend import extended_stage
 from rtcomp.diagnosis.floor import floor_errors
+from rtcomp.diagnosis.held_out import HeldOut
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.motion import Motion, prepare
 from rtcomp.diagnosis.refine import Refined, refine
@@ -79,32 +81,38 @@ def diagnose(
         part = float(np.linalg.norm(rough.residual) / max(float(np.linalg.norm(rough.system.y)), 1e-300))
         say(0.5, "balance")
         located(part, locate(motion, rough.residual, None, seed, stage.axis))
-    base = finer(stage, motion, fit_base(stage, motion))
-    retuned_stage = extended_stage(stage, base, [])
+    base, floor, least = _refitted(stage, motion, seed)
     say(1.0, "balance")
-    floor = floor_errors(retuned_stage, base, motion, seed + 1)
     unseen_sticking = mostly_hidden(stage, recordings)
     loud = float(floor.sum()) > LOUD**2 * float(base.system.blocks.power[base.ledger.seen].sum())
     if unseen_sticking > MUCH and loud:
         return told_by_position(stage, recordings, motion, base, unseen_sticking, say, seed)
-    least = np.maximum(floor, NEGLIGIBLE**2 / ABOVE_FLOOR * base.system.blocks.power[base.ledger.seen])
     told = explain(stage, motion, base, floor, least, say, seed)
+    believed, first = stage, base
+    tuned = other_numbers(stage, motion, told.final, told.entries, least)
+    if tuned is not None:
+        stage = tuned
+        base, floor, least = _refitted(stage, motion, seed)
+        told = explain(stage, motion, base, floor, least, say, seed)
+        told = replace(told, fit=replace(told.fit, before=HeldOut.of(believed, motion).error))
     decision, named, final, fit = told.decision, told.named, told.final, told.fit
     if unseen_sticking > MUCH and not named and _open(final, least):
         # Forces name nothing, and in many rows friction cannot be told from the motion: they are no judge.
-        return told_by_position(stage, recordings, motion, base, unseen_sticking, say, seed)
+        return told_by_position(believed, recordings, motion, base, unseen_sticking, say, seed)
     extended, entries_found = told.stage, told.entries
     # What is bent to an unknown cause may do far worse on other motion, however well it does on this one.
     if not named and (_open(final, least) or fit.after > KEPT * fit.before):
-        extended = stage
+        extended = believed
         fit = Fit(fit.before, fit.retuned, fit.before, fit.floor)
     say(0.4, "locate")
-    where = locate(motion, base.residual, final.residual if named else None, seed, stage.axis)
+    where = locate(motion, first.residual, final.residual if named else None, seed, stage.axis)
     refined = decision.refined if final is not base else refine(base, motion, [])
     beside = neighbours(stage, motion, refined)
     effects = _effects(decision, named, base, final, least, motion, beside)
-    retuned = retunings(stage, refined, beside, extended, birge(final, least))
-    folded = bool(entries_found) and not named and extended is not stage
+    retuned = retunings(believed, refined, beside, extended, birge(final, least))
+    if tuned is not None and extended is not believed:
+        retuned += numbers_moved(believed, tuned, motion, refined, birge(final, least))
+    folded = bool(entries_found) and not named and extended is not believed
     verdict = _verdict(effects, final, floor, least, fit, folded)
     if verdict == "consistent":
         where = []
@@ -137,10 +145,18 @@ def diagnose(
         _candidates(decision, base, sights),
         [*_notes(motion, recordings), *_known_here(named, motion, stage.axis), *flat],
         motion.plain([s.time for s in motion.strips]),
-        base.residual,
+        first.residual,
         final.residual,
         np.isin(base.ledger.block, motion.unseen).astype(np.float64),
     )
+
+
+def _refitted(stage: Stage, motion: Motion, seed: int) -> tuple[Fitted, Floats, Floats]:
+    """Return the stage refitted, and squared errors (N^2) of seen blocks: the floor, and worth a look."""
+    base = finer(stage, motion, fit_base(stage, motion))
+    floor = floor_errors(extended_stage(stage, base, []), base, motion, seed + 1)
+    power = base.system.blocks.power[base.ledger.seen]
+    return base, floor, np.maximum(floor, NEGLIGIBLE**2 / ABOVE_FLOOR * power)
 
 
 def _effects(

@@ -13,7 +13,6 @@ import numpy as np
 
 from rtcomp.diagnosis.base import Fitted, bounds_of
 from rtcomp.diagnosis.blocks import Blocks
-from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.double import resimulated
 from rtcomp.diagnosis.ledger import Ledger
 from rtcomp.diagnosis.motion import Motion, Strip, unstepped
@@ -32,17 +31,11 @@ def floor_errors(stage: Stage, fitted: Fitted, motion: Motion, seed: int = 1) ->
     if twin is None:
         return np.asarray(method + _shaken(fitted, motion, seed))
     other = Ledger(stage, twin, ledger.reaches, ledger.known)
-    system = other.system(stage_effects(stage, ledger))
+    system = other.system()
     bounds = bounds_of(stage, system.columns.shape[1], slack=0.3)
     errors = system.blocks.left_out(seen, bounds)
     scale = power.sum() / max(float(system.blocks.power[seen].sum()), 1e-300)
     return np.asarray(np.maximum(errors * scale, method))
-
-
-def stage_effects(stage: Stage, ledger: Ledger) -> list:  # type: ignore[type-arg]
-    """Return the effects of `stage` that the ledger does not already know."""
-    effects = [effect_of(e) for e in stage.mechanics.effects]
-    return [e for e in effects if e not in ledger.known]
 
 
 def _shaken(fitted: Fitted, motion: Motion, seed: int) -> np.ndarray:

@@ -30,6 +30,7 @@ RETUNED: dict[str, frozenset[str]] = {
     "inertia": frozenset({"mass"}),
     "viscous-friction": frozenset({"viscous"}),
     "back-emf": frozenset({"viscous"}),
+    "stribeck": frozenset({"stribeck"}),
 }
 """Parameters of the stage whose retuning says the same as the effect's name."""
 SLOTS = {"mass": "mass", "viscous": "viscous", "force_constant": "force_constant", "friction.level": "level"}

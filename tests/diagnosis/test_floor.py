@@ -40,3 +40,19 @@ def test_without_noise_the_method_alone_is_left() -> None:
     power = fitted.system.blocks.power[fitted.ledger.seen].sum()
     floor = floor_errors(axis, fitted, motion)
     assert np.sqrt(floor.sum() / power) == pytest.approx(0.0015, rel=0.5)
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        {"name": "cogging", "amplitude": 0.4, "period": 1.3e-4, "phase": 0.4},  # of the drive
+        {"name": "stribeck", "rise": 0.3, "velocity": 5e-3},  # of friction
+        {"name": "parallel-spring", "stiffness": 2000.0},
+    ],
+    ids=lambda e: e["name"],
+)
+def test_what_the_stage_is_believed_to_have_counts_once(effect: dict[str, Any]) -> None:
+    axis = Stage.from_dict({**STAGE, "stage": {**STAGE["stage"], "effects": [effect]}})
+    motion = prepare(axis, [run(axis, reference())])
+    fitted = fit_base(axis, motion)
+    assert 0.5 < float(fitted.errors.sum() / floor_errors(axis, fitted, motion).sum()) < 2.0

@@ -61,6 +61,7 @@ COGGING = case("one", hidden("cogging", period=1e-3))
         (case("one", hidden("inertia")), said("retuned", moved=("mass",)), True, True, True),
         (case("one", hidden("inertia")), said("retuned", moved=("viscous",)), False, False, False),
         (case("one", hidden("drive-gain")), said("retuned", moved=("friction",)), True, True, True),
+        (case("one", hidden("stribeck")), said("retuned", moved=("stribeck",)), True, True, True),
     ],
 )  # fmt: skip
 def test_one_effect(of: Case, what: Said, right: bool, first: bool, held: bool) -> None:
