@@ -12,7 +12,7 @@ from rtcomp.diagnosis.base import FIXED, SCALES, Fitted, fit_base
 from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.ledger import WHOLE
-from rtcomp.diagnosis.lengths import SCALE, beside, has_places
+from rtcomp.diagnosis.lengths import beside, takes_along
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Refined, refine
 from rtcomp.diagnosis.scene import Entry, Scene
@@ -34,6 +34,8 @@ NEARLY = 0.93
 BESIDE = {"backlash": "resonance", "resonance": "backlash"}
 """Entries not looked for beside each other: a play has a contact that rings, a second mass goes loose."""
 
+NOT_IN_PROPORTION = ("drive-deadband", "drive-saturation", "torque-ripple")
+"""Entries beside which a force added to the command is not the same as one added to the axis."""
 UNDECIDED = {
     "asymmetric-friction": "closing", "cogging": "harmonics", "load-dependent-friction": "following",
 }  # fmt: skip
@@ -115,9 +117,25 @@ def _variants(entry: Entry, stage: Stage) -> list[Entry]:
         return [entry, {**entry, "share": LOAD_SHARE, "contact": CONTACT}]
     if name == "drive-offset":
         # The same force, but beside what changes the drive it is not the same physics.
-        force = float(entry["offset"]) * stage.force_constant  # type: ignore[arg-type]
-        return [entry, {"name": "constant-force", "force": force}]
+        return [entry, _other_side(entry, stage)]
     return [entry]
+
+
+def _biases(entries: list[Entry], added: Entry, stage: Stage) -> list[list[Entry]]:
+    """Return `entries`, and where `added` tells the two apart also with a bias on the drive's other side."""
+    if added["name"] not in NOT_IN_PROPORTION:
+        return [entries]
+    other = [_other_side(e, stage) for e in entries]
+    return [entries, other] if other != entries else [entries]
+
+
+def _other_side(entry: Entry, stage: Stage) -> Entry:
+    """Return an offset of the drive as the force that it makes, and such a force as an offset."""
+    if entry["name"] == "drive-offset":
+        return {"name": "constant-force", "force": float(entry["offset"]) * stage.force_constant}  # type: ignore[arg-type]
+    if entry["name"] == "constant-force":
+        return {"name": "drive-offset", "offset": float(entry["force"]) / stage.force_constant}  # type: ignore[arg-type]
+    return entry
 
 
 def _quickly(current: Fitted, motion: Motion, entries: list[Entry], screened: Screened) -> list[Refined]:
@@ -128,17 +146,17 @@ def _quickly(current: Fitted, motion: Motion, entries: list[Entry], screened: Sc
     found = []
     variants = [(v, screened.ground) for v in _variants(screened.entry, current.ledger.stage)]
     for variant, ground in [*variants, *((form.entry, form.ground) for form in screened.forms)]:
-        try:
-            made = beside(entries, variant)
+        for at_work in _biases(entries, variant, current.ledger.stage):
+            made = beside(at_work, variant)
             # On another ground than the one that they were found on, those at work are others too;
-            # and beside a scale of the sensor, they are elsewhere.
-            moved = ground is not None or (variant["name"] == SCALE and has_places(entries))
-            which = None if moved else [len(entries)]
-            tried = refine(ground or current, motion, made, which, QUICK)
-        except (ConfigError, np.linalg.LinAlgError):
-            continue
-        if not _below_a_count(tried.entries[-1], current.ledger.stage):
-            found.append(tried)
+            # and where the sensor reads otherwise, they are elsewhere.
+            which = None if ground is not None or takes_along(variant, entries) else [len(entries)]
+            try:
+                tried = refine(ground or current, motion, made, which, QUICK)
+            except (ConfigError, np.linalg.LinAlgError):
+                continue
+            if not _below_a_count(tried.entries[-1], current.ledger.stage):
+                found.append(tried)
     found.sort(key=_weighed)
     kind = UNDECIDED.get(screened.name)
     others = [r for r in found if kind and r.entries[-1].get(kind) != found[0].entries[-1].get(kind)]

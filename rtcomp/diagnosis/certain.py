@@ -8,6 +8,7 @@ beside it that fit nearly as well.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,6 +33,8 @@ BESIDE = (0.85, 1.18)
 """Factors on the reaches of the grids that a fit is held against."""
 MOVED = 0.02
 """Relative change of a parameter that is worth reporting."""
+SEVERAL = 3
+"""Numbers that must have moved for it to be said that all did."""
 FREEDOM, WIDE = 9, 2.262
 """Degrees of freedom of about ten blocks, and standard deviations of a 95 % interval from them (Student)."""
 
@@ -145,43 +148,61 @@ def _apart(knob: Knob, one: float, other: float) -> float:
     return abs(one - other)
 
 
-def retunings(
-    believed: Stage, refined: Refined, beside: Sequence[Refined], extended: Stage, worse: float = 1.0
-) -> list[Retuned]:
+@dataclass(frozen=True)
+class Numbers:
+    """Mass, viscous friction, micro-damping, level and reach of friction, believed and found, (5,) each."""
+
+    before: Floats
+    values: Floats
+    half: Floats
+    """Half widths of plain 95 % intervals."""
+    held: Floats
+    """How far back the interval reaches of what the belief holds at its bound, 0 of the others."""
+
+    @classmethod
+    def of(
+        cls, believed: Stage, refined: Refined, beside: Sequence[Refined], extended: Stage, worse: float = 1.0
+    ) -> Numbers:
+        """Gather them; `worse` widens the intervals (`birge`)."""
+        final = refined.fitted
+        seen = final.ledger.seen
+        sets = []
+        for k in np.flatnonzero(seen):
+            others = seen.copy()
+            others[k] = False
+            sets.append(_numbers(final, final.system.blocks.coefficients(others, final.bounds)))
+        values = _numbers(final, final.coefficients)
+        spread = np.diag(scatter(np.array(sets)))
+        grid = np.zeros(values.size)
+        for b in beside:
+            apart = np.abs(_numbers(b.fitted, b.fitted.coefficients) - values)
+            grid = np.maximum(grid, _weight(final, b.fitted) * apart)
+        m, now = believed.mechanics, extended.mechanics
+        values[:2] = now.mass, now.viscous  # with what was folded into them
+        if refined.knobs:
+            # What the entries' own numbers leave open, these do, as far as they make up for them.
+            pulled = _pulled(believed, refined, values)
+            spread = spread + np.einsum("ik,kl,il->i", pulled, covariance(refined), pulled)
+        friction = believed.friction
+        own = level_and_reach(friction.elements) if isinstance(friction, MaxwellSlip) else (0.0, 0.0)
+        before = np.array([m.mass, m.viscous, m.micro_damping, *own])
+        half = worse * np.sqrt(WIDE**2 * np.maximum(spread, 0.0) + grid**2 + (MODEL * values) ** 2)
+        # What is held at its bound is so by the belief, not by the recording: its interval reaches back.
+        held = np.zeros(values.size)
+        for i in range(FIXED):
+            if before[i] > 0 and abs(abs(values[i] / before[i] - 1.0) / BELIEVED - 1.0) < 0.05:
+                held[i] = BELIEVED * before[i]
+        return cls(before, values, half, held)
+
+
+def retunings(numbers: Numbers, axis: str) -> list[Retuned]:
     """Return the believed parameters that the fit moved, with their 95 % intervals.
 
     Numbers are told because they moved: of so chosen ones, plain intervals miss more than a twentieth.
     Theirs are wider by how few were chosen (Benjamini and Yekutieli 2005, J. American Statistical
     Association 100(469)).
     """
-    final = refined.fitted
-    seen = final.ledger.seen
-    sets = []
-    for k in np.flatnonzero(seen):
-        others = seen.copy()
-        others[k] = False
-        sets.append(_numbers(final, final.system.blocks.coefficients(others, final.bounds)))
-    values = _numbers(final, final.coefficients)
-    spread = np.diag(scatter(np.array(sets)))
-    grid = np.zeros(values.size)
-    for b in beside:
-        apart = np.abs(_numbers(b.fitted, b.fitted.coefficients) - values)
-        grid = np.maximum(grid, _weight(final, b.fitted) * apart)
-    m, now = believed.mechanics, extended.mechanics
-    values[:2] = now.mass, now.viscous  # with what was folded into them
-    if refined.knobs:
-        # What the entries' own numbers leave open, these do, as far as they make up for them.
-        pulled = _pulled(believed, refined, values)
-        spread = spread + np.einsum("ik,kl,il->i", pulled, covariance(refined), pulled)
-    friction = believed.friction
-    own = level_and_reach(friction.elements) if isinstance(friction, MaxwellSlip) else (0.0, 0.0)
-    before = np.array([m.mass, m.viscous, m.micro_damping, *own])
-    half = worse * np.sqrt(WIDE**2 * np.maximum(spread, 0.0) + grid**2 + (MODEL * values) ** 2)
-    # What is held at its bound is so by the belief, not by the recording: its interval reaches back to it.
-    held = np.zeros(values.size)
-    for i in range(FIXED):
-        if before[i] > 0 and abs(abs(values[i] / before[i] - 1.0) / BELIEVED - 1.0) < 0.05:
-            held[i] = BELIEVED * before[i]
+    before, values, half, held = numbers.before, numbers.values, numbers.half, numbers.held
     names = ("mass", "viscous", "micro_damping", "friction.level", "friction.reach")
     units = ("kg", "N s/m", "N s/m", "N", "m")
     moved = np.abs(values - before)
@@ -191,9 +212,36 @@ def retunings(
     found = []
     for i in np.flatnonzero(clear > wider).tolist():
         new, size = float(values[i]), float(max(wider * half[i], held[i]))
-        value = Value(new, max(new - size, 0.0), new + size, for_axis(units[i], believed.axis))
+        value = Value(new, max(new - size, 0.0), new + size, for_axis(units[i], axis))
         found.append(Retuned(names[i], float(before[i]), value))
     return found
+
+
+def all_by_one_factor(numbers: Numbers) -> tuple[float, float] | None:
+    """Return the factor by which all forces moved, and the half width of its interval, if they agree.
+
+    No recording of voltage and position tells such numbers from another force constant, which is one number
+    and not four.
+    """
+    forces = slice(0, 4)  # a reach is no force
+    some = numbers.before[forces] > 0
+    before = numbers.before[forces][some]
+    ratio, half = numbers.values[forces][some] / before, numbers.half[forces][some] / before
+    open_by = np.maximum(half, numbers.held[forces][some] / before)
+    factor = float(np.average(ratio, weights=open_by**-2.0))
+    size = float(np.sqrt(1.0 / np.sum(open_by**-2.0)))
+    clear = np.count_nonzero(np.abs(ratio - 1.0) > half)
+    apart = np.abs(ratio - factor) > open_by
+    if clear < SEVERAL or apart.any() or abs(factor - 1.0) < max(MOVED, size):
+        return None
+    return factor, size
+
+
+def force_constant(believed: Stage, factor: float, half: float) -> Retuned:
+    """Return another force constant in the place of forces that all moved by `factor` (+- `half`)."""
+    was = believed.force_constant
+    value = Value(was / factor, was / (factor + half), was / (factor - half), for_axis("N/V", believed.axis))
+    return Retuned("force_constant", was, value)
 
 
 def widening(clear: Floats, family: int) -> float:

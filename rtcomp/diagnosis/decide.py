@@ -57,6 +57,10 @@ class Choice:
     probability: float
     gain: float
 
+    def put_first(self, name: str) -> None:
+        """Give it the name at work: a further entry may have told it from the one that came first."""
+        self.names = [name, *(n for n in self.names if n != name)]
+
 
 @dataclass
 class Decision:
@@ -160,6 +164,8 @@ def decide(
         choices.append(Choice(names, probability, gained))
         refined = best
         entries, current = refined.entries, refined.fitted
+        for choice, entry in zip(choices, entries, strict=True):
+            choice.put_first(str(entry["name"]))
     if len(choices) > 1:
         refined = _exchange(stage, motion, refined, choices, floor, part_of(MOST - 1), without)
     refined, choices = _prune(stage, motion, refined, choices, floor)

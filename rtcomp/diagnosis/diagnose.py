@@ -13,12 +13,20 @@ from rtcomp.diagnosis.base import Fitted, finer, fit_base
 from rtcomp.diagnosis.believed_effects import numbers_moved, other_numbers
 from rtcomp.diagnosis.by_position.sticking import MUCH, mostly_hidden
 from rtcomp.diagnosis.by_position.told import told_by_position
-from rtcomp.diagnosis.certain import birge, intervals, neighbours, retunings
+from rtcomp.diagnosis.certain import (
+    Numbers,
+    all_by_one_factor,
+    birge,
+    force_constant,
+    intervals,
+    neighbours,
+    retunings,
+)
 from rtcomp.diagnosis.curves import curves, left_over
 from rtcomp.diagnosis.decide import Choice, Decision
 from rtcomp.diagnosis.experiment import next_experiment
 from rtcomp.diagnosis.explain import AGREES, NEGLIGIBLE, explain
-from rtcomp.diagnosis.extend import extended_stage
+from rtcomp.diagnosis.extend import extended_stage, with_forces
 from rtcomp.diagnosis.floor import floor_errors
 from rtcomp.diagnosis.held_out import HeldOut
 from rtcomp.diagnosis.locate import locate
@@ -109,7 +117,12 @@ def diagnose(
     refined = decision.refined if final is not base else refine(base, motion, [])
     beside = neighbours(stage, motion, refined)
     effects = _effects(decision, named, base, final, least, motion, beside)
-    retuned = retunings(believed, refined, beside, extended, birge(final, least))
+    numbers = Numbers.of(believed, refined, beside, extended, birge(final, least))
+    retuned = retunings(numbers, stage.axis)
+    factor = None if named or stage.mechanics.effects else all_by_one_factor(numbers)
+    if factor is not None and extended is not believed:
+        extended = with_forces(extended, 1.0 / factor[0])
+        retuned = [force_constant(believed, *factor)]
     if tuned is not None and extended is not believed:
         retuned += numbers_moved(believed, tuned, motion, refined, birge(final, least))
     folded = bool(entries_found) and not named and extended is not believed

@@ -39,9 +39,10 @@ CONFIRMED = 0.92
 the error shows nothing."""
 AGREES = 0.006
 """Relative force error up to which a recording is held to agree, whatever its noise promises."""
-FAR, NEARLY_ALL = 4.0, 0.97
-"""A lone name that leaves more than FAR times the floor of what was put aside, and explains less than
-NEARLY_ALL of its squared error above that, is the nearest of the catalogue to something that is not in it."""
+FAR, NEARLY_ALL, TOGETHER = 4.0, 0.97, 0.9
+"""Names that leave more than FAR times the floor of what was put aside, and explain less of its squared error
+above that than NEARLY_ALL (a lone one) or TOGETHER, are the nearest of the catalogue to something that is not
+in it."""
 STRAYED = 9.0
 """How much further (see `departure`) than half again the retuning names may take what is believed."""
 AGAIN = 2
@@ -104,7 +105,7 @@ def explain(
         shaped = any(str(e["name"]) not in SHAPELESS for e in entries)
         least_part = MUCH if decision.left(floor) > OPEN else LEAST
         strays = shaped and departure(final) > 1.5 * departure(base) + STRAYED
-        little = shaped and (_explains_little(fit, least_part) or (len(named) == 1 and _leaves_much(fit)))
+        little = shaped and (_explains_little(fit, least_part) or _leaves_much(fit, len(named)))
         if faint or decision.faint:
             # Where the level shows nothing, whatever else is in one block is as large as the name.
             little = typical > CONFIRMED and (little or fit.after > CONFIRMED * fit.retuned)
@@ -135,9 +136,9 @@ def _explains_little(fit: Fit, least: float) -> bool:
     return fit.retuned**2 > floor and fit.after**2 - floor > (1.0 - least) * (fit.retuned**2 - floor)
 
 
-def _leaves_much(fit: Fit) -> bool:
+def _leaves_much(fit: Fit, names: int = 1) -> bool:
     """Tell whether far more than noise is left of what was put aside, and more than trimming explains."""
-    return fit.after > FAR * fit.floor and _explains_little(fit, NEARLY_ALL)
+    return fit.after > FAR * fit.floor and _explains_little(fit, NEARLY_ALL if names == 1 else TOGETHER)
 
 
 EVEN = 0.01

@@ -43,6 +43,17 @@ def extended_stage(believed: Stage, fitted: Fitted, entries: Sequence[Entry]) ->
     return Stage.from_dict(data)
 
 
+def with_forces(stage: Stage, factor: float) -> Stage:
+    """Return a stage that moves as `stage` does, with all its forces and the drive's times `factor`."""
+    m = stage.mechanics
+    changes: dict[str, Any] = {
+        key: factor * getattr(m, key) for key in ("mass", "force_constant", "viscous", "micro_damping")
+    }
+    if isinstance(m.friction, list):
+        changes["friction"] = [{"stiffness": factor * e.stiffness, "reach": e.reach} for e in m.friction]
+    return stage.with_changes(stage=changes)
+
+
 def _shift_bias(effects: list[dict[str, Any]], force: float, force_constant: float) -> None:
     """Add `force` (N) to the first constant force or offset among `effects`."""
     for effect in effects:

@@ -11,7 +11,7 @@ from rtcomp.diagnosis.base import Fitted, fit_base
 from rtcomp.diagnosis.candidates import effect_of, searches
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.ledger import WHOLE, Ledger, System
-from rtcomp.diagnosis.lengths import beside
+from rtcomp.diagnosis.lengths import beside, has_places
 from rtcomp.diagnosis.scene import Column, Entry, Point, Scene
 from rtcomp.diagnosis.search_at_work import at_work
 from rtcomp.errors import ConfigError
@@ -60,10 +60,11 @@ def screen(
     # An entry that shrinks the drive side shrinks every error; all are stated for the believed drive.
     power = float(fitted.system.blocks.power[fitted.ledger.seen].sum())
     best: dict[tuple[object, ...], Screened] = {}
+    wavy = has_places(effects)
     at_hand = shared(lambda search: _tried(fitted, effects, power, search), searches(scene), progress)
     for one in (*at_hand, *_as_believed(scene, effects, power)):
         if one is not None:
-            _keep(best, one)
+            _keep(best, one, wavy)
     first: dict[str, Screened] = {}
     for one in sorted(best.values(), key=lambda b: float(b.errors.sum())):
         known = first.setdefault(one.name, one)
@@ -96,9 +97,13 @@ def _tried(fitted: Fitted, others: list[Entry], power: float, search: Column | P
     return Screened(search.name, entry, errors) if np.isfinite(errors).all() else None
 
 
-def _keep(best: dict[tuple[object, ...], Screened], one: Screened) -> None:
-    """Keep the best of each name and form, on either ground."""
-    key = (one.name, *_form(one.entry), one.ground is None)
+def _keep(best: dict[tuple[object, ...], Screened], one: Screened, wavy: bool) -> None:
+    """Keep the best of each name and form, on either ground.
+
+    Of a drift beside waves (`wavy`) each size: it moves them along, and only a fit of both tells which.
+    """
+    size = one.entry.get("drift") if wavy else None
+    key = (one.name, *_form(one.entry), size, one.ground is None)
     if key not in best or one.errors.sum() < best[key].errors.sum():
         best[key] = one
 

@@ -90,13 +90,32 @@ def lawful(command: Floats, position: Floats, marked: npt.NDArray[np.bool_]) -> 
     """
     if len(command) < SPREAD_WINDOW:
         return np.zeros_like(marked)
+    found = _explained(command, position, marked, _law(command, position, np.zeros_like(marked)))
+    if (found == marked).all():
+        return found
+    # A wrong sample bends the law as well: once more, without what it does not explain.
+    beside = np.zeros_like(marked)
+    for away in range(-LAW, LAW + 1):
+        beside[np.clip(np.flatnonzero(marked & ~found) + away, 0, len(marked) - 1)] = True
+    return _explained(command, position, marked, _law(command, position, beside))
+
+
+def _law(command: Floats, position: Floats, without: npt.NDArray[np.bool_]) -> Floats:
+    """Return how a command answers the newest LAW readings, fitted to all rows but those `without`."""
     gram, with_command = np.zeros((LAW, LAW)), np.zeros(LAW)
-    for rows, volts in zip(sample(position), sample(command), strict=True):
-        edge = slice(LAW, len(rows) - LAW)
-        readings = _readings(_sudden(rows), np.arange(len(rows))[edge])
+    stretches = zip(sample(position), sample(command), sample(without), strict=True)
+    for rows, volts, left_out in stretches:
+        at = np.flatnonzero(~left_out[LAW : len(rows) - LAW]) + LAW
+        readings = _readings(_sudden(rows), at)
         gram += readings.T @ readings
-        with_command += readings.T @ _sudden(volts)[edge]
-    law = np.linalg.lstsq(gram, with_command, rcond=1e-12)[0]
+        with_command += readings.T @ _sudden(volts)[at]
+    return np.asarray(np.linalg.lstsq(gram, with_command, rcond=1e-12)[0])
+
+
+def _explained(
+    command: Floats, position: Floats, marked: npt.NDArray[np.bool_], law: Floats
+) -> npt.NDArray[np.bool_]:
+    """Return those of the `marked` rows of which `law` leaves little."""
     found = np.zeros_like(marked)
     for piece in pieces(len(command)):
         at = np.flatnonzero(marked[piece])

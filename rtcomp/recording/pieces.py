@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 PIECE = 1 << 20
 """Rows of a piece."""
@@ -27,7 +29,7 @@ def steps(column: Floats) -> Iterator[tuple[int, Floats]]:
         yield part.start, np.diff(column[part.start : part.stop + 1])
 
 
-def sample(column: Floats) -> list[Floats]:
+def sample(column: npt.NDArray[Scalar]) -> list[npt.NDArray[Scalar]]:
     """Return all of a short column; of a long one stretches, evenly spread."""
     if len(column) <= STRETCHES * STRETCH:
         return [column]

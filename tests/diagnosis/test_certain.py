@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from recorded import run, there_and_back
 from recorded import stage as axis
 
 from rtcomp.diagnosis.base import fit_base
-from rtcomp.diagnosis.certain import covariance, retunings, scatter, widening
+from rtcomp.diagnosis.certain import (
+    Numbers,
+    all_by_one_factor,
+    covariance,
+    force_constant,
+    retunings,
+    scatter,
+    widening,
+)
+from rtcomp.diagnosis.diagnose import diagnose
 from rtcomp.diagnosis.extend import extended_stage
 from rtcomp.diagnosis.motion import prepare
 from rtcomp.diagnosis.refine import refine
@@ -50,7 +61,7 @@ def test_what_scales_all_numbers_leaves_them_as_open_as_itself_is() -> None:
     base = fit_base(stage, motion)
     refined = refine(base, motion, [{"name": "drive-gain", "gain": 0.9}], tries=1)
     level = stage.friction.level  # type: ignore[union-attr]
-    told = retunings(stage, refined, [], extended_stage(stage, refined.fitted, []))
+    told = retunings(Numbers.of(stage, refined, [], extended_stage(stage, refined.fitted, [])), "linear")
     assert all(r.after.low <= level <= r.after.high for r in told if r.parameter == "friction.level")
     assert float(np.sqrt(covariance(refined)[0, 0])) * refined.knobs[0].step > 0.01
 
@@ -59,7 +70,62 @@ def test_a_mass_that_is_another_is_told_with_an_interval_that_holds_it() -> None
     true, believed = axis(mass=2.0 * 1.09), axis()
     motion = prepare(believed, [run(true, there_and_back(8.0))])
     refined = refine(fit_base(believed, motion), motion, [])
-    told = {r.parameter: r.after for r in retunings(believed, refined, [], believed.with_changes(
-        stage={"mass": float(refined.fitted.coefficients[0])}))}  # fmt: skip
+    found = believed.with_changes(stage={"mass": float(refined.fitted.coefficients[0])})
+    numbers = Numbers.of(believed, refined, [], found)
+    assert all_by_one_factor(numbers) is None
+    told = {r.parameter: r.after for r in retunings(numbers, "linear")}
     assert list(told) == ["mass"]
     assert told["mass"].low <= true.mass <= told["mass"].high
+
+
+def numbers(*found: float, half: float = 0.01, held: float = 0.0) -> Numbers:
+    """Mass, viscous friction, micro-damping and level, of which 1 was believed; the reach as believed."""
+    return Numbers(
+        np.ones(5), np.array([*found, 1.0]), np.full(5, half), np.array([held, held, 0.0, 0.0, 0.0])
+    )
+
+
+@pytest.mark.parametrize(
+    ("told", "factor"),
+    [
+        (numbers(1.1, 1.1, 1.1, 1.1), 1.1),
+        (numbers(0.93, 0.94, 0.93, 0.935), 0.934),
+        (numbers(1.1, 1.1, 1.1, 1.0), None),  # friction's level is as believed
+        (numbers(1.1, 1.04, 1.1, 1.1), None),
+        (numbers(1.12, 1.12, 1.2, 1.2, half=0.02, held=0.12), 1.198),  # bounds of the belief say nothing
+        (numbers(1.1, 1.1, 1.0, 1.1, half=0.2), None),  # nothing is known
+        (numbers(1.01, 1.01, 1.01, 1.01, half=0.001), None),  # a hundredth is no news
+    ],
+)
+def test_forces_that_all_moved_by_one_factor_are_another_force_constant(
+    told: Numbers, factor: float | None
+) -> None:
+    found = all_by_one_factor(told)
+    if factor is None:
+        assert found is None
+        return
+    assert found is not None and found[0] == pytest.approx(factor, abs=0.003)
+    one = force_constant(axis(), *found)
+    assert one.after.value == pytest.approx(one.before / factor, rel=0.003)
+    assert one.after.low < one.after.value < one.after.high
+
+
+def test_a_number_that_is_not_believed_says_nothing_of_the_others() -> None:
+    some = numbers(1.1, 0.0, 0.0, 1.1)
+    zero = np.array([1.0, 0.0, 0.0, 1.0, 1.0])
+    assert all_by_one_factor(replace(some, before=zero)) is None  # two are too few
+    three = replace(numbers(1.1, 1.1, 0.0, 1.1), before=np.array([1.0, 1.0, 0.0, 1.0, 1.0]))
+    assert all_by_one_factor(three) is not None
+
+
+def test_a_force_constant_that_is_another_is_told_as_such_and_moves_alike() -> None:
+    true, believed = axis(force_constant=4.0 / 1.08), axis()
+    motion = run(true, there_and_back(8.0))
+    done = diagnose(believed, [motion])
+    assert done.verdict == "retuned"
+    (told,) = done.retuned
+    assert told.parameter == "force_constant"
+    assert told.after.low <= true.force_constant <= told.after.high
+    assert done.stage.force_constant == pytest.approx(true.force_constant, rel=0.02)
+    assert done.stage.mass == pytest.approx(believed.mass, rel=0.03)
+    assert done.fit.after < 0.2 * done.fit.before

@@ -101,6 +101,12 @@ def test_a_lone_name_must_not_leave_far_more_than_noise(fit: Fit, much: bool) ->
     assert _leaves_much(fit) is much
 
 
+def test_several_names_may_leave_more_but_not_most_of_it() -> None:
+    assert not _leaves_much(Fit(0.25, 0.25, 0.05, 0.01), names=2)  # 97 %: what two kernels leave
+    assert _leaves_much(Fit(0.25, 0.25, 0.05, 0.01), names=1)
+    assert _leaves_much(Fit(0.12, 0.117, 0.08, 0.004), names=2)
+
+
 def test_what_happens_once_may_harm_a_little_where_it_does_not_happen() -> None:
     slightly_worse = Fit(0.0017, 0.0072, 0.0030, 0.0015)
     assert _holds(slightly_worse, once=True) and not _holds(slightly_worse)

@@ -11,10 +11,11 @@ from test_alike import reference
 
 from rtcomp.diagnosis.addition import best_addition
 from rtcomp.diagnosis.base import fit_base
-from rtcomp.diagnosis.lengths import beside, has_places, left_out
+from rtcomp.diagnosis.lengths import METRES, beside, has_places, left_out, takes_along
 from rtcomp.diagnosis.motion import prepare
 from rtcomp.diagnosis.refine import refine
 from rtcomp.diagnosis.scene import Entry
+from rtcomp.physics import catalogue
 from rtcomp.stage.stage import Stage
 
 COGGING: Entry = {"name": "cogging", "amplitude": 0.3, "period": 7e-5, "phase": 0.4}
@@ -36,17 +37,48 @@ def test_a_scale_takes_places_along_and_gives_them_back(scale: float, entries: l
     assert found["end-stop"]["position"] == pytest.approx(scale * 1e-4)
     assert found["position-force"]["knots"] == pytest.approx([-scale * 1e-4, 0.0, scale * 1e-4])
     assert found["sensor-periodic-error"] == CYCLIC  # the sensor's own
-    assert found["end-stop"]["stiffness"] == 2e4
+    assert found["end-stop"]["stiffness"] == pytest.approx(2e4 / scale)
+    assert found["cogging"]["amplitude"] == 0.3 and found["position-force"]["values"] == CURVE["values"]
     again = left_out(first, len(first) - 1)
     for before, after in zip(entries, again, strict=True):
         for key, value in before.items():
             assert after[key] == (value if isinstance(value, str) else pytest.approx(value, rel=1e-12))
 
 
+@pytest.mark.parametrize(
+    ("entry", "key", "power"),
+    [
+        ({"name": "quadratic-drag", "coefficient": 3.0}, "coefficient", -2),  # F = c v |v|
+        ({"name": "parallel-spring", "stiffness": 3.0, "cubic": 0.0}, "stiffness", -1),  # F = k x
+        ({"name": "parallel-spring", "stiffness": 0.0, "cubic": 3.0}, "cubic", -3),
+        ({"name": "inertia", "mass": 3.0}, "mass", -1),  # F = m a
+        ({"name": "stribeck", "rise": 0.1, "velocity": 3.0}, "velocity", 1),
+        ({"name": "stiction-ageing", "growth": 0.1, "distance": 3.0, "onset": 0.1}, "distance", 1),
+    ],
+)  # fmt: skip
+def test_the_same_force_along_longer_lengths(entry: Entry, key: str, power: int) -> None:
+    longer = beside([entry], SCALE)[0]
+    assert longer[key] == pytest.approx(3.0 * 1.2**power)
+    assert {k: v for k, v in longer.items() if k != key} == {k: v for k, v in entry.items() if k != key}
+
+
+def test_every_unit_with_a_length_is_known() -> None:
+    units = {p.unit for entry in catalogue.entries() for p in entry.parameters}
+    assert {u for u in units - {"N m"} if "m" in u or u == "kg"} == set(METRES)
+
+
 def test_what_changes_no_length_moves_nothing() -> None:
     assert beside([COGGING], STOP) == [COGGING, STOP]
     assert left_out([COGGING, STOP], 0) == [STOP]
     assert has_places([CYCLIC, COGGING]) and not has_places([CYCLIC])
+
+
+def test_what_is_read_elsewhere_takes_waves_along_and_a_scale_whatever_has_a_length() -> None:
+    drift: Entry = {"name": "sensor-drift", "drift": 1e-5, "time_constant": 3.0}
+    drag: Entry = {"name": "quadratic-drag", "coefficient": 3.0}
+    assert takes_along(drift, [COGGING]) and not takes_along(drift, [drag])
+    assert takes_along(SCALE, [drag]) and not takes_along(SCALE, [CYCLIC])
+    assert not takes_along(drag, [COGGING])
 
 
 def test_a_scale_is_found_beside_a_wave_along_the_way() -> None:
