@@ -42,7 +42,8 @@ AGREES = 0.006
 FAR, NEARLY_ALL, TOGETHER = 4.0, 0.97, 0.9
 """Names that leave more than FAR times the floor of what was put aside, and explain less of its squared error
 above that than NEARLY_ALL (a lone one) or TOGETHER, are the nearest of the catalogue to something that is not
-in it."""
+in it. Several are held to that only where the floor is a double's: what the method leaves at the least is no
+measure of how far four names may be from a machine."""
 STRAYED = 9.0
 """How much further (see `departure`) than half again the retuning names may take what is believed."""
 AGAIN = 2
@@ -81,6 +82,7 @@ def explain(
     distinct = DISTINCT if clear or bool(base.errors.sum() > NEGLIGIBLE**2 * power) else None
     if distinct is None and base.errors.sum() > ABOVE_FLOOR * floor.sum():
         distinct = MAINLY
+    doubled = stage.controller is not None and all(s.reference is not None for s in motion.strips)
     without: frozenset[str] = frozenset()
     looks = []
     for _ in range(AGAIN + 1):
@@ -105,7 +107,7 @@ def explain(
         shaped = any(str(e["name"]) not in SHAPELESS for e in entries)
         least_part = MUCH if decision.left(floor) > OPEN else LEAST
         strays = shaped and departure(final) > 1.5 * departure(base) + STRAYED
-        little = shaped and (_explains_little(fit, least_part) or _leaves_much(fit, len(named)))
+        little = shaped and (_explains_little(fit, least_part) or _leaves_much(fit, len(named), doubled))
         if faint or decision.faint:
             # Where the level shows nothing, whatever else is in one block is as large as the name.
             little = typical > CONFIRMED and (little or fit.after > CONFIRMED * fit.retuned)
@@ -136,9 +138,10 @@ def _explains_little(fit: Fit, least: float) -> bool:
     return fit.retuned**2 > floor and fit.after**2 - floor > (1.0 - least) * (fit.retuned**2 - floor)
 
 
-def _leaves_much(fit: Fit, names: int = 1) -> bool:
+def _leaves_much(fit: Fit, names: int = 1, doubled: bool = True) -> bool:
     """Tell whether far more than noise is left of what was put aside, and more than trimming explains."""
-    return fit.after > FAR * fit.floor and _explains_little(fit, NEARLY_ALL if names == 1 else TOGETHER)
+    least = NEARLY_ALL if names == 1 else TOGETHER
+    return (names == 1 or doubled) and fit.after > FAR * fit.floor and _explains_little(fit, least)
 
 
 EVEN = 0.01

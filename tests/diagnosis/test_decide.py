@@ -105,6 +105,8 @@ def test_several_names_may_leave_more_but_not_most_of_it() -> None:
     assert not _leaves_much(Fit(0.25, 0.25, 0.05, 0.01), names=2)  # 97 %: what two kernels leave
     assert _leaves_much(Fit(0.25, 0.25, 0.05, 0.01), names=1)
     assert _leaves_much(Fit(0.12, 0.117, 0.08, 0.004), names=2)
+    assert not _leaves_much(Fit(0.12, 0.117, 0.08, 0.004), names=2, doubled=False)
+    assert _leaves_much(Fit(0.12, 0.117, 0.08, 0.004), names=1, doubled=False)
 
 
 def test_what_happens_once_may_harm_a_little_where_it_does_not_happen() -> None:
