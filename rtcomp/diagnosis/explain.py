@@ -114,6 +114,8 @@ def explain(
         once = any(e["name"] == "sensor-jump" for e in named)
         if not named or (_holds(fit, typical, once) and not strays and not little):
             return Explanation(decision, named, entries, own, final, fit)
+        if little and len(named) > 1:
+            break  # others beside each other would not be nearer
         without |= {first}
     # What the ledger gains must hold in the stage itself; else it is not offered as an explanation.
     decision.choices = []
