@@ -23,6 +23,8 @@ ANSWER = 4
 """Rows for which a controller is taken to answer a step."""
 LAW = 5
 """Newest readings that a command is taken to answer at once, in proportion,"""
+USUALLY = 0.999
+"""Quantile of what is sudden in a command, beyond which it may be cut off,"""
 LAWFUL = 0.25
 """and the part of what is sudden in it that such an answer may leave."""
 COUNTS = 4.5
@@ -90,25 +92,33 @@ def lawful(command: Floats, position: Floats, marked: npt.NDArray[np.bool_]) -> 
     """
     if len(command) < SPREAD_WINDOW:
         return np.zeros_like(marked)
-    found = _explained(command, position, marked, _law(command, position, np.zeros_like(marked)))
+    # A few wrong samples may bend the law until it explains nothing: once with the largest cut off, then
+    # once more without what the better law does not explain.
+    nothing = np.zeros_like(marked)
+    laws = [_law(command, position, nothing, most) for most in (1.0, USUALLY)]
+    found = max((_explained(command, position, marked, law) for law in laws), key=np.count_nonzero)
     if (found == marked).all():
         return found
-    # A wrong sample bends the law as well: once more, without what it does not explain.
     beside = np.zeros_like(marked)
     for away in range(-LAW, LAW + 1):
         beside[np.clip(np.flatnonzero(marked & ~found) + away, 0, len(marked) - 1)] = True
-    return _explained(command, position, marked, _law(command, position, beside))
+    again = _explained(command, position, marked, _law(command, position, beside))
+    return max(found, again, key=np.count_nonzero)
 
 
-def _law(command: Floats, position: Floats, without: npt.NDArray[np.bool_]) -> Floats:
-    """Return how a command answers the newest LAW readings, fitted to all rows but those `without`."""
+def _law(command: Floats, position: Floats, without: npt.NDArray[np.bool_], most: float = 1.0) -> Floats:
+    """Return how a command answers the newest LAW readings, fitted to all rows but those `without`.
+
+    What is sudden in the command is cut off at its quantile `most`.
+    """
     gram, with_command = np.zeros((LAW, LAW)), np.zeros(LAW)
-    stretches = zip(sample(position), sample(command), sample(without), strict=True)
-    for rows, volts, left_out in stretches:
+    sudden = [_sudden(volts) for volts in sample(command)]
+    limit = float(np.quantile(np.abs(np.concatenate(sudden)), most))
+    for rows, volts, left_out in zip(sample(position), sudden, sample(without), strict=True):
         at = np.flatnonzero(~left_out[LAW : len(rows) - LAW]) + LAW
         readings = _readings(_sudden(rows), at)
         gram += readings.T @ readings
-        with_command += readings.T @ _sudden(volts)[at]
+        with_command += readings.T @ np.clip(volts[at], -limit, limit)
     return np.asarray(np.linalg.lstsq(gram, with_command, rcond=1e-12)[0])
 
 
