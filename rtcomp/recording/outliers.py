@@ -22,11 +22,11 @@ ANSWERED = 12.0
 ANSWER = 4
 """Rows for which a controller is taken to answer a step."""
 LAW = 5
-"""Newest readings that a command is taken to answer at once, in proportion,"""
+"""Newest readings that a command is taken to answer at once, in proportion."""
 USUALLY = 0.999
-"""Quantile of what is sudden in a command, beyond which it may be cut off,"""
+"""Quantile of what is sudden in a command, beyond which wrong samples may bend the answer."""
 LAWFUL = 0.25
-"""and the part of what is sudden in it that such an answer may leave."""
+"""Part of what is sudden in a command that such an answer may leave."""
 COUNTS = 4.5
 """An outlier is further off than this many of the sensor's counts, however quiet the signal."""
 
