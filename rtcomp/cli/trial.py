@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 @click.command()
 @click.option("--cases", type=click.IntRange(1, 100_000), default=40, show_default=True, help="How many.")
 @click.option("--seed", type=click.IntRange(0, 2**62), default=0, show_default=True, help="What is drawn.")
+@click.option(
+    "--resume", metavar="DIR", type=click.Path(path_type=Path),
+    help="Go on with a trial that was stopped: where it was kept. Its cases and seed count.",
+)  # fmt: skip
 @output_options("out/trial")
 @click.option("--jobs", type=click.IntRange(1, 1024), help="Processes at a time; default one a core.")
 @click.option("--keep", is_flag=True, help="Keep recordings, diagnoses and replays, not only the scores.")
@@ -38,6 +42,7 @@ if TYPE_CHECKING:
 def trial(
     cases: int,
     seed: int,
+    resume: Path | None,
     out: Path,
     force: bool,
     jobs: int | None,
@@ -51,7 +56,8 @@ def trial(
 
     Plants, hidden effects, noise and beliefs are drawn by a simulator that shares no physics with the
     program; answers are committed to, diagnoses run in processes of their own, and only then are answers
-    opened and scored. Leaves trial.json, rows.csv, commitments.json and answers.json.
+    opened and scored. Leaves trial.json, rows.csv, commitments.json and answers.json. A trial that is
+    interrupted says where it is kept; --resume goes on from there.
 
     \b
     Example:
@@ -59,17 +65,23 @@ def trial(
     """
     from rtcomp.report.terminal import Progress
     from rtcomp.trial.rival import RIVALS
+    from rtcomp.trial.stopped import Stopped
     from rtcomp.trial.trial import Settings
     from rtcomp.trial.trial import trial as run
 
     here = (sys.executable, "-m", "rtcomp.cli.main")
     diagnose = tuple(shlex.split(command)) if command else (*here, "diagnose")
     chosen = tuple(RIVALS) if rivals == "all" else ()
+    if resume is not None:
+        so_far = Stopped.read(resume)
+        cases, seed = so_far.cases, so_far.seed
     settings = Settings(
         cases, seed, jobs or os.cpu_count() or 1, diagnose, (*here, "replay"), timeout, chosen
     )
     with prepare_output(out, force) as work, Progress("trial", quiet=as_json) as bar:
-        done = run(settings, work, lambda step, n, of: bar.update(n / of, {step: f"{n} of {of}"}), keep)
+        done = run(
+            settings, work, lambda step, n, of: bar.update(n / of, {step: f"{n} of {of}"}), keep, resume
+        )
         content = done.to_json(settings)
     if as_json:
         click.echo(to_json({**content, "out": str(out)}))

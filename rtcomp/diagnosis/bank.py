@@ -1,8 +1,9 @@
 """Friction as columns: what each unit of the base does along a motion, with what changes friction at work.
 
 Units are viscous friction and micro-damping of size 1, and a stop element of 1 N/m for each reach. All go
-through the kernels of the catalogue in one pass. What depends on the whole of friction (its level, how far
-it is along its branch) is given that of the friction at hand, of which the units are parts: it stays linear.
+along the motion in one pass, the elements by the law of the catalogue's and not by a call of it for each.
+What depends on the whole of friction (its level, how far it is along its branch) is given that of the
+friction at hand, of which the units are parts: it stays linear.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ import numpy as np
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics import Effect
 from rtcomp.physics.closing import ClosingBranches
-from rtcomp.physics.maxwell_slip import MaxwellSlip
+from rtcomp.physics.maxwell_slip import MaxwellSlip, stretched
 from rtcomp.physics.program import Program, renew, run_chain
 from rtcomp.physics.speed import MicroDamping, ViscousFriction
-from rtcomp.physics.wires import COUNT, FRICTION, GRAIN, GRIP, GRIP_LEVEL, GRIP_STIFFNESS
+from rtcomp.physics.wires import COUNT, FRICTION, GRAIN, GRIP, GRIP_LEVEL, GRIP_STIFFNESS, MOVED, REACH, SCALE
 from rtcomp.stage.balance import along_row, around_rows, parts_of
 from rtcomp.stage.stage import Stage
 
@@ -44,9 +45,8 @@ def units_along(
     units: list[Effect] = [
         ViscousFriction(coefficient=1.0),
         MicroDamping(coefficient=1.0, speed=stage.mechanics.micro_damping_speed),
-        *(MaxwellSlip([(1.0, float(r))]) for r in reaches),
     ]
-    models = units[-1].order
+    models = MaxwellSlip.order
     chain = sorted(modifiers, key=lambda e: e.order)
     before = [*sorted(drive, key=lambda e: (e.place, e.order)), *(e for e in chain if e.order < models)]
     after = [e for e in chain if e.order > models]
@@ -57,15 +57,14 @@ def units_along(
     program = Program([*before, *units, *bent, *after])
     row = float((motion[-1, 0] - motion[0, 0]) / max(motion.shape[0] - 1, 1))
     parts = parts_of([*before, *after], row)
-    out = np.empty((motion.shape[0], len(units)))
+    out = np.empty((motion.shape[0], SPEED_UNITS + len(reaches)))
     rising, falling = (np.zeros_like(out) if parts > 1 else out[:1] for _ in range(2))
     w = np.zeros(COUNT)
     w[GRAIN] = grain
     base = np.array([stage.mass, stage.force_constant])
-    first = len(before), len(before) + SPEED_UNITS
     _along(
-        program.steps, program.p, program.s, w, base, motion, parts, *first, len(bent), weights, reaches, out,
-        rising, falling,
+        program.steps, program.p, program.s, w, base, motion, parts, len(before), len(bent), weights, reaches,
+        out, rising, falling,
     )  # fmt: skip
     return around_rows(out) if parts == 1 else rising + np.append(falling[1:], falling[-1:], axis=0)
 
@@ -80,7 +79,6 @@ def _along(
     motion: Floats,
     parts: int,
     first: int,
-    elements: int,
     bent: int,
     weights: Floats,
     reaches: Floats,
@@ -88,14 +86,16 @@ def _along(
     rising: Floats,
     falling: Floats,
 ) -> None:
-    """Fill `out` with forces at the rows: units are the effects from `first` on, elements from `elements` on.
+    """Fill `out` with forces at the rows: units of speed are the effects from `first` on.
 
     Where rows are cut into `parts`, also their means over the row before each, weighed by what has passed
-    of it (`rising`) and by what is to come (`falling`). After the elements come `bent` effects that bend
+    of it (`rising`) and by what is to come (`falling`). After those units come `bent` effects that bend
     branches. What else changes the whole of friction is shared out among the elements in proportion to what
     each holds.
     """
     count = weights.size
+    then = first + SPEED_UNITS
+    deflection = np.zeros(count)
     level = stiffness = 0.0
     for i in range(count):
         level += weights[i] * reaches[i]
@@ -107,23 +107,27 @@ def _along(
             renew(w, base[0], base[1])
             w[GRIP_LEVEL], w[GRIP_STIFFNESS] = level, stiffness
             run_chain(steps, p, s, w, 0, first)
-            total = 0.0
-            for i in range(first, elements + count):
+            for i in range(SPEED_UNITS):
                 w[FRICTION] = 0.0
-                run_chain(steps, p, s, w, i, i + 1)
-                out[k, i - first] = w[FRICTION]
-                if i >= elements:
-                    total += weights[i - elements] * w[FRICTION]
+                run_chain(steps, p, s, w, first + i, first + i + 1)
+                out[k, i] = w[FRICTION]
+            held = out[k, SPEED_UNITS:]
+            moved, longer, scale = w[MOVED], w[REACH], w[SCALE]
+            for i in range(count):
+                deflection[i] = stretched(deflection[i], moved, reaches[i] * longer)
+                held[i] = deflection[i] * scale
+            total = 0.0
+            for i in range(count):
+                total += weights[i] * held[i]
             # The whole is what the chain sees from here on, and at the next step.
             w[GRIP], w[GRIP_LEVEL], w[GRIP_STIFFNESS] = total, level, stiffness
             w[FRICTION] = total
             if bent > 0 and level > 0.0:
-                held = out[k, elements - first :]
-                _bend(steps, p, s, w, elements + count, total, level, weights, reaches, held)
+                _bend(steps, p, s, w, then, total, level, weights, reaches, held)
             whole = w[FRICTION]
-            run_chain(steps, p, s, w, elements + count + bent, steps[0])
+            run_chain(steps, p, s, w, then + bent, steps[0])
             if whole != 0.0:
-                for i in range(elements - first, out.shape[1]):
+                for i in range(SPEED_UNITS, out.shape[1]):
                     out[k, i] *= w[FRICTION] / whole
             if parts > 1:
                 passed = (j - 0.5) / parts

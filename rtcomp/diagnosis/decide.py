@@ -6,6 +6,7 @@ which entries count; the set of names is all that explain the same as well on th
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -97,11 +98,13 @@ def decide(
     progress: Progress | None = None,
     without: frozenset[str] = frozenset(),
     distinct: float | None = None,
+    promising: Callable[[Refined], bool] | None = None,
 ) -> Decision:
     """Name what is missing; `floor` is the squared error of every seen block if nothing were.
 
     Names in `without` are not considered. With `distinct` it is looked for whatever the floor says: an
-    entry may stand out of a level that does not, if it explains that part of it.
+    entry may stand out of a level that does not, if it explains that part of it. Entries that are not
+    `promising` are left as they were found, and not looked for again beside each other.
     """
     entries: list[Entry] = []
     choices: list[Choice] = []
@@ -166,7 +169,7 @@ def decide(
         entries, current = refined.entries, refined.fitted
         for choice, entry in zip(choices, entries, strict=True):
             choice.put_first(str(entry["name"]))
-    if len(choices) > 1:
+    if len(choices) > 1 and (promising is None or promising(refined)):
         refined = _exchange(stage, motion, refined, choices, floor, part_of(MOST - 1), without)
     refined, choices = _prune(stage, motion, refined, choices, floor)
     if free_curve is not None:

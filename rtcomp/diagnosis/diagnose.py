@@ -25,7 +25,7 @@ from rtcomp.diagnosis.certain import (
 from rtcomp.diagnosis.curves import curves, left_over
 from rtcomp.diagnosis.decide import Choice, Decision
 from rtcomp.diagnosis.experiment import next_experiment
-from rtcomp.diagnosis.explain import AGREES, NEGLIGIBLE, explain
+from rtcomp.diagnosis.explain import AGREES, NEGLIGIBLE, does_harm, explain
 from rtcomp.diagnosis.extend import extended_stage, with_forces
 from rtcomp.diagnosis.floor import floor_errors
 from rtcomp.diagnosis.held_out import HeldOut
@@ -106,7 +106,9 @@ def diagnose(
     decision, named, final, fit = told.decision, told.named, told.final, told.fit
     if unseen_sticking > MUCH and not named and _open(final, least):
         # Forces name nothing, and in many rows friction cannot be told from the motion: they are no judge.
-        return told_by_position(believed, recordings, motion, base, unseen_sticking, say, seed)
+        by_position = told_by_position(believed, recordings, motion, base, unseen_sticking, say, seed)
+        if not by_position.effects or not does_harm(by_position.fit, 1.5 * by_position.fit.floor):
+            return by_position
     extended, entries_found = told.stage, told.entries
     # What is bent to an unknown cause may do far worse on other motion, however well it does on this one.
     if not named and (_open(final, least) or fit.after > KEPT * fit.before):

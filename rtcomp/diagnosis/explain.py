@@ -16,7 +16,7 @@ from rtcomp.diagnosis.extend import extended_stage
 from rtcomp.diagnosis.held_out import HeldOut
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.motion import Motion
-from rtcomp.diagnosis.refine import consistent
+from rtcomp.diagnosis.refine import Refined, consistent
 from rtcomp.diagnosis.result import Fit
 from rtcomp.diagnosis.scene import Entry
 from rtcomp.kernels import Floats
@@ -31,9 +31,13 @@ STRUCTURED = 0.3
 HARM, WORSE, HELP = 1.02, 1.1, 0.95
 """Factors on the held-out error of the stage, believed, retuned and (where it is more than the floor) retuned
 again, beyond which names are taken back."""
-LEAST, MUCH, OPEN = 0.35, 0.7, 0.2
+LEAST, MOST_OF_IT, MUCH, OPEN = 0.35, 0.6, 0.7, 0.2
 """Part of the held-out squared error above the floor that names with a shape of their own must explain: in
-general, and where they leave more than the part OPEN of the mismatch that was seen."""
+general, where the floor is a double's, and where they leave more than the part OPEN of the mismatch that was
+seen."""
+PROMISING = 0.45
+"""The same part, of several names before they are looked for again beside each other: that mends some, but
+not so much. Only where the floor is a double's."""
 CONFIRMED = 0.92
 """Factor to which a name must bring the held-out error, in all or in the typical block, where the level of
 the error shows nothing."""
@@ -83,10 +87,16 @@ def explain(
     if distinct is None and base.errors.sum() > ABOVE_FLOOR * floor.sum():
         distinct = MAINLY
     doubled = stage.controller is not None and all(s.reference is not None for s in motion.strips)
+
+    def promising(refined: Refined) -> bool:
+        together = consistent(refined)
+        own = extended_stage(stage, together.fitted, together.entries)
+        return not _explains_little(Fit(before, plain.error, HeldOut.of(own, motion).error, rest), PROMISING)
+
     without: frozenset[str] = frozenset()
     looks = []
     for _ in range(AGAIN + 1):
-        decision = decide(stage, motion, base, least, say, without, distinct)
+        decision = decide(stage, motion, base, least, say, without, distinct, promising if doubled else None)
         looks.append((decision.first_look, decision.first_refined))
         decision.first_look, decision.first_refined = looks[0]
         decision.refined = consistent(decision.refined)
@@ -105,7 +115,7 @@ def explain(
         typical = held.typically(plain)
         fit = Fit(before, plain.error, held.error, rest)
         shaped = any(str(e["name"]) not in SHAPELESS for e in entries)
-        least_part = MUCH if decision.left(floor) > OPEN else LEAST
+        least_part = MUCH if decision.left(floor) > OPEN else MOST_OF_IT if doubled else LEAST
         strays = shaped and departure(final) > 1.5 * departure(base) + STRAYED
         little = shaped and (_explains_little(fit, least_part) or _leaves_much(fit, len(named), doubled))
         if faint or decision.faint:
@@ -114,12 +124,17 @@ def explain(
         once = any(e["name"] == "sensor-jump" for e in named)
         if not named or (_holds(fit, typical, once) and not strays and not little):
             return Explanation(decision, named, entries, own, final, fit)
-        if little and len(named) > 1:
+        if little and len(entries) > 1:
             break  # others beside each other would not be nearer
         without |= {first}
     # What the ledger gains must hold in the stage itself; else it is not offered as an explanation.
     decision.choices = []
     return Explanation(decision, [], [], retuned, base, Fit(before, plain.error, plain.error, rest))
+
+
+def does_harm(fit: Fit, much: float = 0.0) -> bool:
+    """Tell whether what was put aside is predicted worse with names than without, and leaves over `much`."""
+    return fit.after > max(HARM * fit.before, much) or fit.after > max(WORSE * fit.retuned, much)
 
 
 def _holds(fit: Fit, typical: float = 1.0, once: bool = False) -> bool:
@@ -129,7 +144,7 @@ def _holds(fit: Fit, typical: float = 1.0, once: bool = False) -> bool:
     happens in no block that is put aside; there it can only harm, and may by a little.
     """
     much = max(1.5 * fit.floor, AGREES if once else 0.0)
-    if fit.after > max(HARM * fit.before, much) or fit.after > max(WORSE * fit.retuned, much):
+    if does_harm(fit, much):
         return False
     return fit.retuned < much or fit.after < HELP * fit.retuned or typical < HELP
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rtcomp.kernels import Floats, effect_kernel
+from rtcomp.kernels import Floats, compiled, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Parameter, Place
 from rtcomp.physics.lists import ListEffect
@@ -14,17 +14,20 @@ STIFFNESS = Parameter("stiffness", "N/m", -1e12, 1e12, "spring of the element")
 REACH_M = Parameter("reach", "m", 0.0, 1e3, "travel at which the element yields", open_low=True)
 
 
+@compiled
+def stretched(deflection: float, moved: float, reach: float) -> float:
+    """Return the deflection (m) of a stop element after it was `moved`: exact, however far."""
+    return min(max(deflection + moved, -reach), reach)
+
+
 @effect_kernel
 def maxwell_slip(p: Floats, s: Floats, w: Floats) -> None:
     """p: count, stiffness and reach of each element, level, whole stiffness; s: deflection (m) of each."""
     force = 0.0
     count = int(p[0])
     for i in range(count):
-        reach = p[2 + 2 * i] * w[REACH]
-        deflection = s[i] + w[MOVED]  # exact over a displacement, however large
-        deflection = min(max(deflection, -reach), reach)
-        s[i] = deflection
-        force += p[1 + 2 * i] * deflection
+        s[i] = stretched(s[i], w[MOVED], p[2 + 2 * i] * w[REACH])
+        force += p[1 + 2 * i] * s[i]
     w[GRIP] = force * w[SCALE]
     w[GRIP_LEVEL] = p[1 + 2 * count]
     w[GRIP_STIFFNESS] = p[2 + 2 * count]

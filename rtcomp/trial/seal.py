@@ -26,9 +26,19 @@ class SealError(RtcompError):
 class Sealed:
     """Answers by case, in memory until they are opened."""
 
-    def __init__(self, answers: Mapping[str, Mapping[str, Any]]) -> None:
+    def __init__(
+        self, answers: Mapping[str, Mapping[str, Any]], salts: Mapping[str, str] | None = None
+    ) -> None:
+        """Seal `answers`, with the `salts` (hexadecimal, by case) of a trial that goes on, or new ones."""
         self._answers = {name: _text(answer) for name, answer in answers.items()}
-        self._salts = {name: secrets.token_bytes(32) for name in answers}
+        self._salts = {
+            name: bytes.fromhex(salts[name]) if salts else secrets.token_bytes(32) for name in answers
+        }
+
+    @property
+    def salts(self) -> dict[str, str]:
+        """The salts; whoever has them and guesses an answer can tell that it is right."""
+        return {name: salt.hex() for name, salt in self._salts.items()}
 
     def commitments(self) -> dict[str, str]:
         """Return the commitment to each answer, which tells nothing about it."""
@@ -38,6 +48,16 @@ class Sealed:
         """Write the commitments; no answer can be changed from here on."""
         content = {"method": METHOD, "commitments": self.commitments()}
         path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+    def check(self, published: Path) -> None:
+        """Raise SealError where an answer is not the one that was committed to in `published`."""
+        committed = _published(published)
+        for name, digest in self.commitments().items():
+            if committed.get(name) != digest:
+                raise SealError(
+                    f"{published}: {name} does not come out as it was committed to; another version of "
+                    "rtcomp drew it: start the trial anew"
+                )
 
     def open(self, path: Path, published: Path) -> dict[str, Any]:
         """Write salts and answers to `path` and return the answers, checked against what was published."""
@@ -51,7 +71,7 @@ class Sealed:
 
 def verify(answers: Path, published: Path) -> dict[str, Any]:
     """Return the answers in a file that was opened; raise SealError where one is not as committed to."""
-    commitments: dict[str, str] = json.loads(published.read_text(encoding="utf-8"))["commitments"]
+    commitments = _published(published)
     opened: dict[str, Any] = json.loads(answers.read_text(encoding="utf-8"))
     odd = sorted(set(commitments) ^ set(opened))
     if odd:
@@ -63,6 +83,11 @@ def verify(answers: Path, published: Path) -> dict[str, Any]:
                 "it was changed after the trial began"
             )
     return {name: entry["answer"] for name, entry in opened.items()}
+
+
+def _published(path: Path) -> dict[str, str]:
+    commitments: dict[str, str] = json.loads(path.read_text(encoding="utf-8"))["commitments"]
+    return commitments
 
 
 def _text(answer: Mapping[str, Any]) -> str:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import csv
+import functools
+import itertools
 import json
 import math
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +27,14 @@ from rtcomp.trial.says import Said
 from rtcomp.trial.score import Errors, Scored, score
 from rtcomp.trial.seal import Sealed
 from rtcomp.trial.stagefile import exact_stage, write_recording
+from rtcomp.trial.stopped import Stopped
 from rtcomp.yamlfile import dump_yaml
 
 EDGE_ROWS = 100
 """Rows left out of the relative force error at either end: filters settle."""
 REPLAY_S = 300.0
+DIAGNOSES = "diagnoses"
+"""Step and folder of the program that is tried; every rival has one by its own name."""
 
 
 @dataclass(frozen=True)
@@ -81,57 +86,99 @@ class Trial:
         }
 
 
-def trial(settings: Settings, out: Path, progress: Progress, keep: bool = False) -> Trial:
+def trial(
+    settings: Settings, out: Path, progress: Progress, keep: bool = False, earlier: Path | None = None
+) -> Trial:
     """Run a trial into the folder `out`; raise SealError where an answer is not what was sealed.
 
     The unseen recordings are made only after the last diagnosis has ended; with `keep` they, the
-    recordings and the diagnoses stay.
+    recordings and the diagnoses stay. A trial that is stopped leaves what another, given its folder as
+    `earlier`, goes on from: what was diagnosed is not diagnosed again.
     """
     started = time.perf_counter()
+    progress_so_far = Stopped.read(earlier) if earlier else Stopped(settings.cases, settings.seed)
+    before = progress_so_far.seconds
+    try:
+        sealed = _sealed(settings, out, progress, progress_so_far, earlier)
+        with Processes(settings.jobs) as processes:
+            done = _through(settings, processes, out, progress, sealed, progress_so_far)
+    except BaseException:
+        # No diagnosis runs any more: only now may salts lie on a disk.
+        progress_so_far.seconds = before + time.perf_counter() - started
+        progress_so_far.write(out)
+        raise
+    if earlier is not None:
+        done.notes.insert(0, f"gone on with after it was stopped at {before:.0f} s")
+    done = replace(done, seconds=before + time.perf_counter() - started)
+    _write(out, settings, done)
+    if not keep:
+        for folder in ("cases", *progress_so_far.ended):
+            shutil.rmtree(out / folder)
+    return done
+
+
+def _sealed(
+    settings: Settings, out: Path, progress: Progress, so_far: Stopped, earlier: Path | None
+) -> Sealed:
+    """Draw all cases, write what the diagnoses get, and commit to the answers (or check them, if gone on)."""
     plans = plan(settings.cases, settings.seed)
-    drawn = []
+    answers = {}
     with ProcessPoolExecutor(settings.jobs) as pool:
         for case in pool.map(_make, plans, [out] * len(plans)):
-            drawn.append(case)
-            progress("draw", len(drawn), len(plans))
-    sealed = Sealed({case.plan.name: case.answer() for case in drawn})
-    sealed.publish(out / "commitments.json")
-    names = [case.plan.name for case in drawn]
-    del drawn
+            answers[case.plan.name] = case.answer()
+            progress("draw", len(answers), len(plans))
+    sealed = Sealed(answers, so_far.salts)
+    if earlier is not None:
+        so_far.bring(earlier, out)
+        sealed.check(out / "commitments.json")
+    else:
+        sealed.publish(out / "commitments.json")
+        so_far.salts = sealed.salts
+    return sealed
+
+
+def _through(
+    settings: Settings, processes: Processes, out: Path, progress: Progress, sealed: Sealed, so_far: Stopped
+) -> Trial:
+    """Diagnose what is left, open the answers and score."""
+    names = list(sealed.salts)
     chosen = [r for r in settings.rivals if not missing(r)]
     notes = [f"rival {r}: {RIVALS[r]} is not installed (extras group rivals)" for r in settings.rivals
              if r not in chosen]  # fmt: skip
-    with Processes(settings.jobs) as processes:
-        said = processes.run(
-            [_diagnosis(settings, out, n) for n in names], _count(progress, "diagnose", names)
-        )
-        others = {
-            r: processes.run([_rival(r, settings, out, n) for n in names], _count(progress, r, names))
-            for r in chosen
-        }
-        if processes.running:
-            raise RuntimeError("a diagnosis still runs; the seal stays closed")
-        answers = sealed.open(out / "answers.json", out / "commitments.json")
-        cases = [Case.again(answers[name]) for name in names]
-        errors = _judge(settings, processes, out, cases, said, progress)
-    rows = [
-        score(case, outcome, *_read(out / "diagnoses" / case.plan.name, outcome), errors.get(case.plan.name))
-        for case, outcome in zip(cases, said, strict=True)
-    ]
-    rivals = {
-        r: figures(
-            [score(c, o, *_read(out / r / c.plan.name, o), None) for c, o in zip(cases, done, strict=True)],
-            gains=False,
-        )
-        for r, done in others.items()
+    steps: dict[str, Callable[[Settings, Path, str], Task]] = {
+        DIAGNOSES: _diagnosis,
+        **{r: functools.partial(_rival, r) for r in chosen},
     }
+    ended = so_far.ended
+    for step, task in steps.items():
+        ended.setdefault(step, {})
+        left = [name for name in names if name not in ended[step]]
+        shown = _count(progress, step, len(names), len(names) - len(left))
+
+        def each(outcome: Outcome, step: str = step, shown: Callable[[Outcome], None] = shown) -> None:
+            ended[step][outcome.name] = outcome
+            shown(outcome)
+
+        processes.run([task(settings, out, name) for name in left], each)
+    if processes.running:
+        raise RuntimeError("a diagnosis still runs; the seal stays closed")
+    answers = sealed.open(out / "answers.json", out / "commitments.json")
+    cases = [Case.again(answers[name]) for name in names]
+    errors = _judge(settings, processes, out, cases, ended[DIAGNOSES], progress)
+    rows = _scored(cases, ended[DIAGNOSES], out / DIAGNOSES, errors)
+    rivals = {r: figures(_scored(cases, ended[r], out / r, {}), gains=False) for r in chosen}
     notes += [f"{r.case.plan.name}: {r.fault}" for r in rows if r.fault]
-    done = Trial(rows, figures(rows), seen(rows), rivals, notes, time.perf_counter() - started)
-    _write(out, settings, done)
-    if not keep:
-        for folder in ("cases", "diagnoses", *chosen):
-            shutil.rmtree(out / folder)
-    return done
+    return Trial(rows, figures(rows), seen(rows), rivals, notes, 0.0)
+
+
+def _scored(
+    cases: Iterable[Case], ended: Mapping[str, Outcome], folder: Path, errors: Mapping[str, Errors]
+) -> list[Scored]:
+    rows = []
+    for case in cases:
+        name = case.plan.name
+        rows.append(score(case, ended[name], *_read(folder / name, ended[name]), errors.get(name)))
+    return rows
 
 
 def _make(chosen: Any, out: Path) -> Case:
@@ -145,9 +192,9 @@ def _make(chosen: Any, out: Path) -> Case:
 
 
 def _diagnosis(settings: Settings, out: Path, name: str) -> Task:
-    case, into = out / "cases" / name, out / "diagnoses" / name
+    case, into = out / "cases" / name, out / DIAGNOSES / name
     command = [*settings.diagnose, str(case / "train.csv.gz"), "--stage", str(case / "stage.yaml")]
-    log = out / "diagnoses" / f"{name}.log"
+    log = out / DIAGNOSES / f"{name}.log"
     return Task(name, (*command, "--out", str(into)), log, settings.timeout_s)
 
 
@@ -158,12 +205,11 @@ def _rival(rival: str, settings: Settings, out: Path, name: str) -> Task:
     return Task(name, command, out / rival / f"{name}.log", settings.timeout_s)
 
 
-def _count(progress: Progress, step: str, names: Sequence[str]) -> Callable[[Outcome], None]:
-    done: list[str] = []
+def _count(progress: Progress, step: str, of: int, done: int = 0) -> Callable[[Outcome], None]:
+    counter = itertools.count(done + 1)
 
     def each(outcome: Outcome) -> None:
-        done.append(outcome.name)
-        progress(step, len(done), len(names))
+        progress(step, next(counter), of)
 
     return each
 
@@ -185,15 +231,15 @@ def _judge(
     processes: Processes,
     out: Path,
     cases: Iterable[Case],
-    said: Sequence[Outcome],
+    said: Mapping[str, Outcome],
     progress: Progress,
 ) -> dict[str, Errors]:
     """Make the unseen recordings and replay believed, diagnosed and exact stages on them."""
     tasks: dict[str, Task] = {}
-    judged = [case for case, outcome in zip(cases, said, strict=True) if outcome.well]
+    judged = [case for case in cases if said[case.plan.name].well]
     for n, case in enumerate(judged):
         name = case.plan.name
-        folder, into = out / "cases" / name, out / "diagnoses" / name
+        folder, into = out / "cases" / name, out / DIAGNOSES / name
         write_recording(folder / "unseen.csv.gz", case.run("unseen"), case.loop.resolution)
         write_recording(folder / "bare.csv.gz", case.run("unseen", bare=True), case.loop.resolution)
         dump_yaml(folder / "exact.yaml", exact_stage(case.bare, case.loop, case.believed))
@@ -206,7 +252,7 @@ def _judge(
             command = [*settings.replay, str(folder / f"{recording}.csv.gz"), "--stage", str(stage)]
             tasks[key] = Task(key, (*command, "--out", str(result)), into / f"{which}.log", REPLAY_S)
         progress("unseen", n + 1, len(judged))
-    ended = processes.run(list(tasks.values()), _count(progress, "replay", list(tasks)))
+    ended = processes.run(list(tasks.values()), _count(progress, "replay", len(tasks)))
     well = {o.name for o in ended if o.well}
     errors = {}
     for case in judged:

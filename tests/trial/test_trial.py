@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import json
+import signal
 import subprocess
 import sys
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -81,6 +83,57 @@ def test_a_diagnosis_that_never_ends_is_ended(tmp_path: Path) -> None:
     for pid in (next(out.glob("cases/*/pids"))).read_text().split():
         stat = Path(f"/proc/{pid}/stat")
         assert not stat.exists() or stat.read_text().rsplit(")", 1)[1].split()[0] == "Z"
+
+
+def stopped(out: Path, number: int = signal.SIGTERM) -> Path:
+    """Stop a trial of three cases when the first is answered; return where it was kept."""
+    stand_in = f"{sys.executable} {STAND_IN} once"
+    command = [*RTCOMP, "trial", "--out", str(out), "--jobs", "1", "--cases", "3", "--seed", "5"]
+    command += ["--rivals", "none", "--diagnose", stand_in]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as run:
+        until = time.monotonic() + 200.0
+        while not (out / "waits").exists() and time.monotonic() < until and run.poll() is None:
+            time.sleep(0.05)
+        run.send_signal(number)
+        _, said = run.communicate(timeout=60.0)
+    kept = out.with_name(f"{out.name}.failed")
+    assert run.returncode == 128 + number and str(kept) in said, said
+    return kept
+
+
+def test_a_trial_that_was_stopped_goes_on(tmp_path: Path) -> None:
+    kept = stopped(tmp_path / "trial")
+    published = (kept / "commitments.json").read_text()
+    assert not (kept / "answers.json").exists()
+    done = list((kept / "diagnoses").glob("*/diagnosis.json"))
+    assert len(done) == 1
+    answer = json.loads(done[0].read_text()) | {"verdict": "unexplained"}  # what tells it from a new one
+    done[0].write_text(json.dumps(answer))
+    out = tmp_path / "again"
+    run = trial(out, "--resume", kept, "--rivals", "none", how="cogging")
+    assert run.returncode == 0, run.stderr
+    content = checked(out, 3)
+    assert (content["seed"], content["cases"]) == (5, 3)
+    assert (out / "commitments.json").read_text() == published
+    verdicts = {row["case"]: row["verdict"] for row in content["rows"]}  # type: ignore[attr-defined]
+    assert verdicts.pop(done[0].parent.name) == "unexplained"
+    assert set(verdicts.values()) == {"missing-physics"}
+    assert "gone on with" in run.stdout
+    # A commitment that is another one means other answers: nothing is diagnosed against those.
+    (kept / "commitments.json").write_text(published.replace(published.split('"')[-2], "0" * 64))
+    run = trial(tmp_path / "other", "--resume", kept, "--rivals", "none", how="cogging")
+    assert run.returncode == 2 and "does not come out as it was committed to" in run.stderr
+
+
+@pytest.mark.parametrize("content", [None, "{", '{"cases": 3}', '{"cases": 3, "seed": 1, "ended": 7}', "[]"])
+def test_only_a_stopped_trial_goes_on(content: str | None, tmp_path: Path) -> None:
+    folder = tmp_path / "kept"
+    folder.mkdir()
+    if content is not None:
+        (folder / "stopped.json").write_text(content)
+    run = trial(tmp_path / "trial", "--resume", folder, how="cogging")
+    assert run.returncode == 2 and "no trial was stopped there" in run.stderr
+    assert len(run.stderr.splitlines()) == 1 and not (tmp_path / "trial").exists()
 
 
 def test_same_seed_same_cases_and_a_case_comes_again_from_its_answer() -> None:
