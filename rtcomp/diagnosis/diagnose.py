@@ -25,10 +25,11 @@ from rtcomp.diagnosis.certain import (
 from rtcomp.diagnosis.curves import curves, left_over
 from rtcomp.diagnosis.decide import Choice, Decision
 from rtcomp.diagnosis.experiment import next_experiment
-from rtcomp.diagnosis.explain import AGREES, NEGLIGIBLE, does_harm, explain
+from rtcomp.diagnosis.explain import NEGLIGIBLE, explain
 from rtcomp.diagnosis.extend import extended_stage, with_forces
 from rtcomp.diagnosis.floor import floor_errors
 from rtcomp.diagnosis.held_out import HeldOut
+from rtcomp.diagnosis.holding import AGREES, does_harm
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.motion import Motion, prepare
 from rtcomp.diagnosis.refine import Refined, refine

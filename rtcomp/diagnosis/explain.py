@@ -14,6 +14,7 @@ from rtcomp.diagnosis.decide import Choice, Decision, decide
 from rtcomp.diagnosis.departure import departure
 from rtcomp.diagnosis.extend import extended_stage
 from rtcomp.diagnosis.held_out import HeldOut
+from rtcomp.diagnosis.holding import explains_little, holds, leaves_much, must_explain
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Refined, consistent
@@ -28,26 +29,12 @@ CLEAR = 0.5
 """Part of the mismatch that depends on one axis, from which on it is looked into however small it is."""
 STRUCTURED = 0.3
 """Part of the remaining mismatch that depends on one axis, from which on names are taken back."""
-HARM, WORSE, HELP = 1.02, 1.1, 0.95
-"""Factors on the held-out error of the stage, believed, retuned and (where it is more than the floor) retuned
-again, beyond which names are taken back."""
-LEAST, MOST_OF_IT, MUCH, OPEN = 0.35, 0.6, 0.7, 0.2
-"""Part of the held-out squared error above the floor that names with a shape of their own must explain: in
-general, where the floor is a double's, and where they leave more than the part OPEN of the mismatch that was
-seen."""
 PROMISING = 0.45
-"""The same part, of several names before they are looked for again beside each other: that mends some, but
-not so much. Only where the floor is a double's."""
+"""Part of what was put aside that several names must explain, before they are looked for again beside
+each other: that mends some, but not so much. Only where the floor is a double's."""
 CONFIRMED = 0.92
 """Factor to which a name must bring the held-out error, in all or in the typical block, where the level of
 the error shows nothing."""
-AGREES = 0.006
-"""Relative force error up to which a recording is held to agree, whatever its noise promises."""
-FAR, NEARLY_ALL, TOGETHER = 4.0, 0.97, 0.9
-"""Names that leave more than FAR times the floor of what was put aside, and explain less of its squared error
-above that than NEARLY_ALL (a lone one) or TOGETHER, are the nearest of the catalogue to something that is not
-in it. Several are held to that only where the floor is a double's: what the method leaves at the least is no
-measure of how far four names may be from a machine."""
 STRAYED = 9.0
 """How much further (see `departure`) than half again the retuning names may take what is believed."""
 AGAIN = 2
@@ -76,22 +63,14 @@ def explain(
     """
     retuned = extended_stage(stage, base, [])
     before, plain = HeldOut.of(stage, motion).error, HeldOut.of(retuned, motion)
-    power = float(base.system.blocks.power[base.ledger.seen].sum())
-    rest = float(np.sqrt(floor.sum() / power))
-    # A floor is an expectation: where most of what is left hangs on one thing, it is no noise.
-    small = bool(base.errors.sum() < ABOVE_FLOOR * least.sum())
-    clear = small and any(p.share > CLEAR for p in locate(motion, base.residual, None, seed))
-    # And where it does not, an entry may still stand out: but that must be seen where nothing was fitted.
-    faint = small and not clear
-    distinct = DISTINCT if clear or bool(base.errors.sum() > NEGLIGIBLE**2 * power) else None
-    if distinct is None and base.errors.sum() > ABOVE_FLOOR * floor.sum():
-        distinct = MAINLY
+    rest = float(np.sqrt(floor.sum() / _power(base)))
+    faint, distinct = _to_look_for(motion, base, floor, least, seed)
     doubled = stage.controller is not None and all(s.reference is not None for s in motion.strips)
 
     def promising(refined: Refined) -> bool:
         together = consistent(refined)
         own = extended_stage(stage, together.fitted, together.entries)
-        return not _explains_little(Fit(before, plain.error, HeldOut.of(own, motion).error, rest), PROMISING)
+        return not explains_little(Fit(before, plain.error, HeldOut.of(own, motion).error, rest), PROMISING)
 
     without: frozenset[str] = frozenset()
     looks = []
@@ -115,14 +94,14 @@ def explain(
         typical = held.typically(plain)
         fit = Fit(before, plain.error, held.error, rest)
         shaped = any(str(e["name"]) not in SHAPELESS for e in entries)
-        least_part = MUCH if decision.left(floor) > OPEN else MOST_OF_IT if doubled else LEAST
+        part = must_explain(decision.left(floor), doubled)
         strays = shaped and departure(final) > 1.5 * departure(base) + STRAYED
-        little = shaped and (_explains_little(fit, least_part) or _leaves_much(fit, len(named), doubled))
+        little = shaped and (explains_little(fit, part) or leaves_much(fit, len(named), doubled))
         if faint or decision.faint:
             # Where the level shows nothing, whatever else is in one block is as large as the name.
             little = typical > CONFIRMED and (little or fit.after > CONFIRMED * fit.retuned)
         once = any(e["name"] == "sensor-jump" for e in named)
-        if not named or (_holds(fit, typical, once) and not strays and not little):
+        if not named or (holds(fit, typical, once) and not strays and not little):
             return Explanation(decision, named, entries, own, final, fit)
         if little and len(entries) > 1:
             break  # others beside each other would not be nearer
@@ -132,33 +111,25 @@ def explain(
     return Explanation(decision, [], [], retuned, base, Fit(before, plain.error, plain.error, rest))
 
 
-def does_harm(fit: Fit, much: float = 0.0) -> bool:
-    """Tell whether what was put aside is predicted worse with names than without, and leaves over `much`."""
-    return fit.after > max(HARM * fit.before, much) or fit.after > max(WORSE * fit.retuned, much)
+def _to_look_for(
+    motion: Motion, base: Fitted, floor: Floats, least: Floats, seed: int
+) -> tuple[bool, float | None]:
+    """Return whether the level of the error shows nothing, and what part of it an entry must explain then."""
+    # A floor is an expectation: where most of what is left hangs on one thing, it is no noise.
+    small = bool(base.errors.sum() < ABOVE_FLOOR * least.sum())
+    clear = small and any(p.share > CLEAR for p in locate(motion, base.residual, None, seed))
+    # And where it does not, an entry may still stand out: but that must be seen where nothing was fitted.
+    distinct = None
+    if clear or base.errors.sum() > NEGLIGIBLE**2 * _power(base):
+        distinct = DISTINCT
+    elif base.errors.sum() > ABOVE_FLOOR * floor.sum():
+        distinct = MAINLY
+    return small and not clear, distinct
 
 
-def _holds(fit: Fit, typical: float = 1.0, once: bool = False) -> bool:
-    """Tell whether names hold on what was put aside: they do no harm there, and help where there is need.
-
-    There, or in the `typical` block of it (error over that of the retuned stage). What happens `once`
-    happens in no block that is put aside; there it can only harm, and may by a little.
-    """
-    much = max(1.5 * fit.floor, AGREES if once else 0.0)
-    if does_harm(fit, much):
-        return False
-    return fit.retuned < much or fit.after < HELP * fit.retuned or typical < HELP
-
-
-def _explains_little(fit: Fit, least: float) -> bool:
-    """Tell whether names explain so little of what was put aside that they are the nearest, not the right."""
-    floor = (1.5 * fit.floor) ** 2
-    return fit.retuned**2 > floor and fit.after**2 - floor > (1.0 - least) * (fit.retuned**2 - floor)
-
-
-def _leaves_much(fit: Fit, names: int = 1, doubled: bool = True) -> bool:
-    """Tell whether far more than noise is left of what was put aside, and more than trimming explains."""
-    least = NEARLY_ALL if names == 1 else TOGETHER
-    return (names == 1 or doubled) and fit.after > FAR * fit.floor and _explains_little(fit, least)
+def _power(base: Fitted) -> float:
+    """Return the squared force (N^2) that the motion seen needs."""
+    return float(base.system.blocks.power[base.ledger.seen].sum())
 
 
 EVEN = 0.01

@@ -10,9 +10,7 @@ import pytest
 
 from rtcomp.diagnosis.accept import MAINLY, modelled, settles_the_rest, stands_out, worth_it
 from rtcomp.diagnosis.decide import ONCE, _once
-from rtcomp.diagnosis.explain import LEAST, MUCH, _explains_little, _holds, _leaves_much
 from rtcomp.diagnosis.look_ahead import most_left
-from rtcomp.diagnosis.result import Fit
 from rtcomp.kernels import Floats
 
 BLOCKS = 20
@@ -78,47 +76,6 @@ def test_an_entry_stands_out_by_what_is_gone_from_the_blocks_not_by_their_level(
     after = quiet_and_loud * np.where(np.arange(BLOCKS) >= BLOCKS - blocks, 1.0 - part, 1.0) * chance
     assert stands_out(quiet_and_loud, after) is does
     assert not stands_out(quiet_and_loud, after, MAINLY)
-
-
-def test_names_that_leave_much_must_explain_most_of_what_was_put_aside() -> None:
-    half = Fit(0.12, 0.10, 0.07, 0.005)
-    assert _explains_little(half, MUCH) and not _explains_little(half, LEAST)
-    most = Fit(0.12, 0.10, 0.03, 0.005)
-    assert not _explains_little(most, MUCH)
-    nothing_to_explain = Fit(0.006, 0.006, 0.006, 0.005)
-    assert not _explains_little(nothing_to_explain, MUCH)
-
-
-@pytest.mark.parametrize(
-    ("fit", "much"),
-    [
-        (Fit(0.8, 0.50, 0.15, 0.002), True),  # nine tenths, and 75 floors left: the nearest name
-        (Fit(0.3, 0.09, 0.021, 0.009), False),  # near the floor: the name's form is not quite the axis's
-        (Fit(0.9, 0.73, 0.12, 0.0015), False),  # so large that what is left is trimming
-    ],
-)
-def test_a_lone_name_must_not_leave_far_more_than_noise(fit: Fit, much: bool) -> None:
-    assert _leaves_much(fit) is much
-
-
-def test_several_names_may_leave_more_but_not_most_of_it() -> None:
-    assert not _leaves_much(Fit(0.25, 0.25, 0.05, 0.01), names=2)  # 97 %: what two kernels leave
-    assert _leaves_much(Fit(0.25, 0.25, 0.05, 0.01), names=1)
-    assert _leaves_much(Fit(0.12, 0.117, 0.08, 0.004), names=2)
-    assert not _leaves_much(Fit(0.12, 0.117, 0.08, 0.004), names=2, doubled=False)
-    assert _leaves_much(Fit(0.12, 0.117, 0.08, 0.004), names=1, doubled=False)
-
-
-def test_what_happens_once_may_harm_a_little_where_it_does_not_happen() -> None:
-    slightly_worse = Fit(0.0017, 0.0072, 0.0030, 0.0015)
-    assert _holds(slightly_worse, once=True) and not _holds(slightly_worse)
-    assert not _holds(Fit(0.0017, 0.0072, 0.0120, 0.0015), once=True)
-
-
-def test_what_helps_in_the_typical_block_holds_though_one_block_hides_it() -> None:
-    hidden_in_one = Fit(0.0048, 0.0046, 0.00456, 0.0018)
-    assert not _holds(hidden_in_one)
-    assert _holds(hidden_in_one, typical=0.84)
 
 
 def test_a_small_gain_counts_where_nearly_every_block_has_it() -> None:
