@@ -35,6 +35,8 @@ GRID = 20
 
 WHOLE = ("load-dependent-friction", "creep", "non-congruent-friction", ClosingBranches.name)
 """Modifiers that ask for the whole of friction, so that its weights change what its units do."""
+HUNG = ("inertia", "resonance")
+"""What the moving mass is, and what of it hangs on a spring."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,10 @@ class Ledger:
         sensors = [e for e in effects if e.place is Place.SENSOR]
         others = [e for e in effects if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
         play = next((e for e in others if e.name == "backlash" and e.values["gap"] > 0.0), None)
-        others = [e for e in others if e.name != "backlash"]
+        hung = sorted((e for e in others if e.name in HUNG), key=lambda e: e.order)
+        if not any(e.name == "resonance" for e in hung):
+            hung = []
+        others = [e for e in others if e.name not in ("backlash", "resonance")]
         before: list[Effect] = []
         if any(e.name == "load-dependent-friction" for e in modifiers):
             before = [*self._drive(), *drive]
@@ -135,6 +140,10 @@ class Ledger:
             if modifiers or others:
                 f = forces(self.stage, [*modifiers, *others], strip.time, x, v, a, strip.voltage)
                 side, moved = side + around_rows(f.push - f.friction), a * f.mass / self.stage.mass
+            if hung:
+                # Part of the mass, whatever it is refitted to: what hangs on it pushes in proportion.
+                f = forces(self.stage, hung, strip.time, x, v, a, strip.voltage)
+                moved = (a * f.mass - around_rows(f.push)) / self.stage.mass
             if play is not None:
                 rest = derivatives(self._behind(sensors, play)[i], self.motion.period)[1]
                 moved = moved + play.values["share"] * (rest - a)
