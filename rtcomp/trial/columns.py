@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from rtcomp.kernels import Floats, compiled
+from rtcomp.kernels import Floats
+from rtcomp.trial.friction import stops_along
 
 ROWS = 4000
 """Rows that a rival is given; a recording has more, which would only cost time."""
@@ -51,9 +52,8 @@ def columns_of(folder: Path) -> Columns:
     micro = float(stage["micro_damping_speed"])
     elements = np.array([[e["stiffness"], e["reach"]] for e in stage["friction"]])
     level = float(elements[:, 0] @ elements[:, 1])
-    h, further = np.zeros_like(x), np.zeros_like(x)
-    _bank(x, elements[:, 0] / level, elements[:, 1].copy(), h)
-    _bank(x, elements[:, 0] / (1.05 * level), 1.05 * elements[:, 1], further)
+    h = stops_along(x, elements[:, 0] / level, elements[:, 1].copy()).sum(axis=1)
+    further = stops_along(x, elements[:, 0] / (1.05 * level), 1.05 * elements[:, 1]).sum(axis=1)
     slowly = np.exp(-((v / micro) ** 2)) * v
     base = np.column_stack([smooth(c) for c in (a, v, h, slowly, further - h)])
     believed = np.array([stage["mass"], stage["viscous"], level, stage["micro_damping"], 0.0])
@@ -96,16 +96,6 @@ def columns_of(folder: Path) -> Columns:
     keys = ("mass", "viscous", "friction.level", "micro_damping")
     moved = tuple((key, float(believed[i]), float(better[i])) for i, key in enumerate(keys))
     return Columns(left, columns, tuple(items[int(i)][0] for i in kept), moved)
-
-
-@compiled
-def _bank(x: Floats, stiffness: Floats, reach: Floats, out: Floats) -> None:
-    """Write the force of stop elements along `x` into `out`."""
-    z = np.zeros(reach.size)
-    for k in range(1, x.size):
-        for i in range(reach.size):
-            z[i] = max(-reach[i], min(reach[i], z[i] + x[k] - x[k - 1]))
-            out[k] += stiffness[i] * z[i]
 
 
 def _period(x: Floats, rest: Floats) -> float:

@@ -5,31 +5,48 @@ The balance here is the trial's own, on the plant's exact parameters: no diagnos
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
 
 from rtcomp.kernels import Floats
-from rtcomp.trial.friction import along
+from rtcomp.trial.friction import ELEMENTS, along, stop_elements, stops_along
 from rtcomp.trial.plant import Loop, Physics, Run
 
 SETTLE_S = 0.3
 """Left out at both ends of a run: filters and memory settle."""
+OFF = 0.1
+"""Part by which what is believed of each stop element may be off."""
 
 
 @dataclass(frozen=True)
 class Balance:
-    """Residual force (N, (K,)), the motion side (N, (K,)), and what retuning can take up (N, (K, R))."""
+    """Residual force (N, (K,)), the motion side (N, (K,)), and what retuning can take up.
+
+    `tangents` (N, (K, R)) as far as it likes, `stops` (N, (K, n)) by the part OFF of each.
+    """
 
     residual: Floats
     needed: Floats
     tangents: Floats
+    stops: Floats
 
+    @functools.cached_property
     def retuned(self) -> Floats:
-        """Return the residual less the best retuning of mass, damping, friction level and reach."""
+        """The residual less the best retuning, (K,).
+
+        That is one of mass, damping, friction level and reach, and of the stiffness of each stop element that
+        the belief gives friction by, which is off by as much as the rest of the belief.
+        """
+        from scipy.optimize import lsq_linear
+
         scale = np.sqrt(np.mean(self.tangents**2, axis=0))
-        basis = self.tangents / np.where(scale > 0.0, scale, 1.0)
-        weights, *_ = np.linalg.lstsq(basis, self.residual, rcond=1e-8)
+        basis = np.column_stack([self.tangents / np.where(scale > 0.0, scale, 1.0), self.stops])
+        most = np.append(np.full(scale.size, np.inf), np.full(self.stops.shape[1], OFF))
+        # Its triangle has all that the squares depend on, in as many rows as there are columns.
+        q, r = np.linalg.qr(basis)
+        weights = lsq_linear(r, q.T @ self.residual, (-most, most)).x
         return np.asarray(self.residual - basis @ weights)
 
 
@@ -61,7 +78,10 @@ def balance(physics: Physics, loop: Loop, run: Run, position: Floats) -> Balance
     edge = int(SETTLE_S * loop.rate)
     inside = slice(edge, slow.size - edge)
     tangents = np.column_stack([smooth(c)[inside] for c in columns])
-    return Balance((drive - needed)[inside], needed[inside], tangents)
+    elements = np.array(stop_elements(physics.level, physics.reach, physics.shape, ELEMENTS))
+    stops = stops_along(warped, elements[:, 0].copy(), elements[:, 1].copy())
+    held_by = np.column_stack([smooth(g * stop)[inside] for stop in stops.T])
+    return Balance((drive - needed)[inside], needed[inside], tangents, held_by)
 
 
 @dataclass(frozen=True)
@@ -81,12 +101,11 @@ class Strength:
         return (self.share if retuning else self.beyond) / self.floor
 
 
-def strength(physics: Physics, loop: Loop, hidden: Run, clean: Run) -> Strength:
-    """Return the strength of what `hidden` has and `clean`, the run of the bare `physics`, has not."""
+def strength(physics: Physics, loop: Loop, hidden: Run, bare: Balance) -> Strength:
+    """Return the strength of what `hidden` has and the run of the `bare` balance has not."""
     seen = balance(physics, loop, hidden, hidden.truth)
-    bare = balance(physics, loop, clean, clean.position)
     rms = _rms(bare.needed)
-    return Strength(_rms(seen.residual) / rms, _rms(seen.retuned()) / rms, _rms(bare.retuned()) / rms)
+    return Strength(_rms(seen.residual) / rms, _rms(seen.retuned) / rms, _rms(bare.retuned) / rms)
 
 
 def _rms(signal: Floats) -> float:

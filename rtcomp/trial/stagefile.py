@@ -10,11 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from rtcomp.trial.friction import stop_elements
+from rtcomp.trial.friction import ELEMENTS, stop_elements
 from rtcomp.trial.plant import Loop, Physics, Run
 
-ELEMENTS = 18
-"""Stop elements that stand for the plant's smooth friction; they miss it by 0.15 % of the level at most."""
 MOVED = 0.11
 """A change by more than a belief is ever wrong without anything hidden (a tenth)."""
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from rtcomp.trial.friction import ELEMENTS
 from rtcomp.trial.plant import Physics
-from rtcomp.trial.stagefile import ELEMENTS, Believed
+from rtcomp.trial.stagefile import Believed
 
 PLANT = Physics(2.0, 4.0, 10.0, 20.0, 100.0, 1e-3, 3.0, 2e-5, 4.0)
 
