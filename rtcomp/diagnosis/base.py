@@ -105,7 +105,7 @@ def fit_base(
             bounds = bounds_of(stage, system.columns.shape[1], names=names)
             found = system.blocks.coefficients(ledger.seen, bounds)
             ledger.weigh(found[FIXED : FIXED + ledger.reaches.size])
-            ledger.found_with_play = play and bool(at_work)
+            ledger.carried = found[:FIXED] if play and at_work else None
         return Fitted(ledger, system, bounds, system.blocks.left_out(ledger.seen, bounds), scale)
 
     return min(shared(at_scale, scales), key=lambda fitted: float(fitted.errors.sum()))

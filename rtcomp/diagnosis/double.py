@@ -50,7 +50,7 @@ class Double:
         if twin is None:
             return None
         plain = extended_stage(stage, refined.fitted, [])
-        other = Ledger(plain, twin, ledger.reaches, ledger.known, found_with_play=ledger.found_with_play)
+        other = Ledger(plain, twin, ledger.reaches, ledger.known, carried=ledger.carried)
         system = other.system([effect_of(e) for e in refined.entries])
         bounds = bounds_of(plain, system.columns.shape[1], names=[str(e["name"]) for e in refined.entries])
         errors = system.blocks.left_out(other.seen, bounds)

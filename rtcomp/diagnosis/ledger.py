@@ -60,8 +60,9 @@ class Ledger:
     """Effects of the believed stage beside its base."""
     memory: Memory = field(default_factory=Memory)
     """What ledgers of this stage and motion share."""
-    found_with_play: bool = False
-    """Whether the weights are those found with a play at work: then its load carries that friction."""
+    carried: Floats | None = None
+    """Mass (kg), viscous and micro-damping (N s/m) found, as the weights were, with a play at work: then its
+    load carries these, else what is believed."""
 
     def __post_init__(self) -> None:
         self.block = self.motion.block()
@@ -167,7 +168,8 @@ class Ledger:
 
     def _behind(self, sensors: Sequence[Effect], play: Effect) -> list[Floats]:
         """Return the position (m) of the load behind a play along each strip."""
-        own = self._believes_load() is None and (self.weights.tobytes(), self.reaches.tobytes())
+        found = () if self.carried is None else (self.carried.tobytes(),)
+        own = self._believes_load() is None and (self.weights.tobytes(), self.reaches.tobytes(), *found)
         return self.memory.loads.of(
             (_key(sensors), _key([play]), own),
             lambda: [self._drawn(x, play) for x, _, _ in self._kinematics(sensors)],
@@ -179,7 +181,7 @@ class Ledger:
         As believed: a play that is not yet in the balance is taken for longer reaches.
         """
         friction = self.stage.friction
-        if not isinstance(friction, MaxwellSlip) or self.found_with_play:
+        if not isinstance(friction, MaxwellSlip) or self.carried is not None:
             return None
         stiffnesses, reaches = zip(*friction.elements, strict=True)
         return np.array(stiffnesses), np.array(reaches)
@@ -187,9 +189,9 @@ class Ledger:
     def _drawn(self, x: Floats, play: Effect) -> Floats:
         m = self.stage.mechanics
         weights, reaches = self._believes_load() or (self.weights, self.reaches)
-        load = Load(
-            play.values["share"] * m.mass, m.viscous, m.micro_damping, m.micro_damping_speed, weights, reaches
-        )
+        numbers = (m.mass, m.viscous, m.micro_damping) if self.carried is None else self.carried
+        mass, viscous, micro = map(float, numbers)
+        load = Load(play.values["share"] * mass, viscous, micro, m.micro_damping_speed, weights, reaches)
         return behind_play(x, self.motion.period, play.values["gap"], play.values["contact"], load)
 
     def _friction(
@@ -218,7 +220,7 @@ class Ledger:
             return self.motion.smooth(rows)
 
         weighs = play is not None or any(e.name in WHOLE for e in modifiers)
-        behind = play is not None and (_key([play]), self.found_with_play)
+        behind = play is not None and (_key([play]), self.carried is not None and self.carried.tobytes())
         own = self.reaches.tobytes(), weighs and self.weights.tobytes()
         return self.memory.frictions.of((_key(before), _key(modifiers), _key(sensors), behind, own), found)
 

@@ -232,4 +232,18 @@ def test_what_grids_share_is_what_each_would_make_for_itself(entry: dict[str, An
             found = one.blocks.power[0] * np.linspace(1.0, 2.0, alone.reaches.size)
             for ledger in (alone, sharing):
                 ledger.weigh(found)
-                ledger.found_with_play = True
+                ledger.carried = np.array([1.9, 7.0, 240.0])
+
+
+def test_a_load_behind_a_play_carries_what_was_found_with_it() -> None:
+    """However wrong the belief: the path behind the play is that of a stage that was believed right."""
+    motion = prepare(stage(), [run(stage(), there_and_back(4.0))])
+    play = effect_of({"name": "backlash", "gap": 2e-6, "share": 0.5, "contact": 250.0})
+    right, wrong = stage(), stage(mass=1.8, viscous=9.0, micro_damping=230.0)
+    columns = []
+    for axis in (right, wrong):
+        ledger = Ledger(axis, motion, grid_of(right))
+        ledger.weigh(believed_weights(right, ledger.reaches))
+        ledger.carried = np.array([2.0, 8.0, 250.0])
+        columns.append(ledger.system([play]).columns)
+    assert columns[1] == pytest.approx(columns[0], rel=1e-12, abs=1e-15)
