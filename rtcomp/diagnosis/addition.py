@@ -237,7 +237,7 @@ def settle(
 
 def _agrees(refined: Refined) -> bool:
     """Tell whether the friction that entries were given is the one found with them at work."""
-    if not any(e.name == "backlash" or e.name in WHOLE for e in map(effect_of, refined.entries)):
+    if not any(e.name in WHOLE for e in map(effect_of, refined.entries)):
         return True
     ledger = refined.fitted.ledger
     now = refined.fitted.coefficients[FIXED : FIXED + ledger.reaches.size]
