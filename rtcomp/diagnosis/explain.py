@@ -29,7 +29,7 @@ CLEAR = 0.5
 """Part of the mismatch that depends on one axis, from which on it is looked into however small it is."""
 STRUCTURED = 0.3
 """Part of the remaining mismatch that depends on one axis, from which on names are taken back."""
-PROMISING = 0.45
+PROMISING = 0.4
 """Part of what was put aside that several names must explain, before they are looked for again beside
 each other: that mends some, but not so much. Only where the floor is a double's."""
 CONFIRMED = 0.92

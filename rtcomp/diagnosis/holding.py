@@ -7,7 +7,7 @@ from rtcomp.diagnosis.result import Fit
 HARM, WORSE, HELP = 1.02, 1.1, 0.95
 """Factors on the held-out error of the stage, believed, retuned and (where it is more than the floor) retuned
 again, beyond which names are taken back."""
-LEAST, MOST_OF_IT, MUCH, OPEN = 0.35, 0.6, 0.7, 0.2
+LEAST, HALF, MUCH, OPEN = 0.35, 0.5, 0.7, 0.2
 """Part of the held-out squared error above the floor that names with a shape of their own must explain: in
 general, where the floor is a double's, and where they leave more than the part OPEN of the mismatch that was
 seen."""
@@ -43,7 +43,7 @@ def must_explain(left: float, doubled: bool) -> float:
     `left` is the part of the mismatch seen that they leave; `doubled` tells whether the floor is a
     double's, so that it is known how much there is to explain.
     """
-    return MUCH if left > OPEN else MOST_OF_IT if doubled else LEAST
+    return MUCH if left > OPEN else HALF if doubled else LEAST
 
 
 def explains_little(fit: Fit, least: float) -> bool:
