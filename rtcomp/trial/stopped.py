@@ -43,25 +43,30 @@ class Stopped:
                 step: {name: Outcome(**outcome) for name, outcome in outcomes.items()}
                 for step, outcomes in content["ended"].items()
             }
-            return cls(**{**content, "ended": ended})
+            found = cls(**{**content, "ended": ended})
+            commitments = json.loads((folder / "commitments.json").read_text(encoding="utf-8"))["commitments"]
+            if commitments.keys() != found.salts.keys() or len(found.salts) != found.cases:
+                raise ValueError("other cases were sealed")
+            return found
         except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
             raise RtcompError(
-                f"{folder}: no trial was stopped there ({FILE} is missing or damaged); give the folder that "
-                "a stopped trial said it was kept in"
+                f"{folder}: no trial was stopped there ({FILE} or commitments.json is missing or "
+                "damaged); give the folder that a stopped trial said it was kept in"
             ) from error
 
     def bring(self, folder: Path, out: Path) -> None:
-        """Copy what was answered, and the commitments, from `folder` to `out`; the rest is made anew."""
+        """Copy what was answered, and the commitments, from `folder` to `out`; the rest is made anew.
+
+        A case whose answer is not there any more counts as not diagnosed, and not as one that failed.
+        """
         shutil.copy(folder / "commitments.json", out / "commitments.json")
         for step, outcomes in self.ended.items():
             (out / step).mkdir(exist_ok=True)
-            for name in outcomes:
-                _copy(folder / step / name, out / step / name)
-                _copy(folder / step / f"{name}.log", out / step / f"{name}.log")
-
-
-def _copy(old: Path, new: Path) -> None:
-    if old.is_dir():
-        shutil.copytree(old, new)
-    elif old.is_file():
-        shutil.copy(old, new)
+            for name in list(outcomes):
+                log, answer = folder / step / f"{name}.log", folder / step / name
+                if not log.is_file() or (outcomes[name].well and not answer.is_dir()):
+                    del outcomes[name]
+                    continue
+                shutil.copy(log, out / step / log.name)
+                if answer.is_dir():
+                    shutil.copytree(answer, out / step / name)

@@ -96,23 +96,23 @@ def trial(
     `earlier`, goes on from: what was diagnosed is not diagnosed again.
     """
     started = time.perf_counter()
-    progress_so_far = Stopped.read(earlier) if earlier else Stopped(settings.cases, settings.seed)
-    before = progress_so_far.seconds
+    so_far = Stopped.read(earlier) if earlier else Stopped(settings.cases, settings.seed)
+    before = so_far.seconds
     try:
-        sealed = _sealed(settings, out, progress, progress_so_far, earlier)
+        sealed = _sealed(settings, out, progress, so_far, earlier)
         with Processes(settings.jobs) as processes:
-            done = _through(settings, processes, out, progress, sealed, progress_so_far)
+            done = _through(settings, processes, out, progress, sealed, so_far)
     except BaseException:
         # No diagnosis runs any more: only now may salts lie on a disk.
-        progress_so_far.seconds = before + time.perf_counter() - started
-        progress_so_far.write(out)
+        so_far.seconds = before + time.perf_counter() - started
+        so_far.write(out)
         raise
     if earlier is not None:
         done.notes.insert(0, f"gone on with after it was stopped at {before:.0f} s")
     done = replace(done, seconds=before + time.perf_counter() - started)
     _write(out, settings, done)
     if not keep:
-        for folder in ("cases", *progress_so_far.ended):
+        for folder in ("cases", *so_far.ended):
             shutil.rmtree(out / folder)
     return done
 
@@ -121,6 +121,8 @@ def _sealed(
     settings: Settings, out: Path, progress: Progress, so_far: Stopped, earlier: Path | None
 ) -> Sealed:
     """Draw all cases, write what the diagnoses get, and commit to the answers (or check them, if gone on)."""
+    if earlier is not None:  # first of all: who stops it again finds here what was found there
+        so_far.bring(earlier, out)
     plans = plan(settings.cases, settings.seed)
     answers = {}
     with ProcessPoolExecutor(settings.jobs) as pool:
@@ -129,7 +131,6 @@ def _sealed(
             progress("draw", len(answers), len(plans))
     sealed = Sealed(answers, so_far.salts)
     if earlier is not None:
-        so_far.bring(earlier, out)
         sealed.check(out / "commitments.json")
     else:
         sealed.publish(out / "commitments.json")

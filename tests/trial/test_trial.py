@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -119,10 +120,34 @@ def test_a_trial_that_was_stopped_goes_on(tmp_path: Path) -> None:
     assert verdicts.pop(done[0].parent.name) == "unexplained"
     assert set(verdicts.values()) == {"missing-physics"}
     assert "gone on with" in run.stdout
+    # An answer that was lost is asked for again, and not scored as one that failed.
+    lost = tmp_path / "lost"
+    shutil.copytree(kept, lost)
+    shutil.rmtree(lost / "diagnoses" / done[0].parent.name)
+    run = trial(tmp_path / "found", "--resume", lost, "--rivals", "none", how="cogging")
+    assert run.returncode == 0, run.stderr
+    rows = checked(tmp_path / "found", 3)["rows"]
+    assert {row["verdict"] for row in rows} == {"missing-physics"}  # type: ignore[attr-defined]
     # A commitment that is another one means other answers: nothing is diagnosed against those.
     (kept / "commitments.json").write_text(published.replace(published.split('"')[-2], "0" * 64))
     run = trial(tmp_path / "other", "--resume", kept, "--rivals", "none", how="cogging")
     assert run.returncode == 2 and "does not come out as it was committed to" in run.stderr
+
+
+def test_a_trial_that_is_stopped_again_while_drawing_loses_nothing(tmp_path: Path) -> None:
+    kept, out = stopped(tmp_path / "trial"), tmp_path / "again"
+    answered = [p.parent.name for p in (kept / "diagnoses").glob("*/diagnosis.json")]
+    command = [*RTCOMP, "trial", "--out", str(out), "--resume", str(kept), "--rivals", "none"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as run:
+        until = time.monotonic() + 60.0
+        while not (out / "diagnoses" / answered[0]).exists() and time.monotonic() < until:
+            time.sleep(0.02)
+        assert not any((out / "cases").glob("*/train.csv.gz"))
+        run.send_signal(signal.SIGTERM)
+        run.communicate(timeout=60.0)
+    again = out.with_name("again.failed")
+    assert [p.parent.name for p in (again / "diagnoses").glob("*/diagnosis.json")] == answered
+    assert json.loads((again / "stopped.json").read_text())["salts"]
 
 
 @pytest.mark.parametrize("content", [None, "{", '{"cases": 3}', '{"cases": 3, "seed": 1, "ended": 7}', "[]"])
