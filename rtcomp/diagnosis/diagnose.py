@@ -32,6 +32,7 @@ from rtcomp.diagnosis.held_out import HeldOut
 from rtcomp.diagnosis.holding import AGREES, does_harm
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.motion import Motion, prepare
+from rtcomp.diagnosis.notes import known_here, looked_at, or_else
 from rtcomp.diagnosis.refine import Refined, refine
 from rtcomp.diagnosis.result import (
     Candidate,
@@ -51,7 +52,7 @@ from rtcomp.kernels import Floats
 from rtcomp.physics import catalogue
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
-from rtcomp.units import for_axis, prefixed
+from rtcomp.units import for_axis
 
 OPEN = 4.0
 """Squared error over the floor's, from which on something remains that no entry explains."""
@@ -59,8 +60,6 @@ LOUD = 0.03
 """Relative force error left by noise and method, from which on forces decide nothing where an axis sticks."""
 KEPT = 0.9
 """Factor on the held-out error below which a retuned stage is given in place of the believed one."""
-ALONG = ("parallel-spring", "position-force", "position-dependent-friction")
-"""Entries whose force beyond the recorded motion is a guess; waves and stops are bounded there."""
 ROUGH = (0.75, 1.0, 1.3)
 """Factors on the believed reaches with which the place of the mismatch is looked for at first."""
 
@@ -159,7 +158,12 @@ def diagnose(
         experiment,
         sights,
         _candidates(decision, base, sights),
-        [*_notes(motion, recordings), *_known_here(named, motion, stage.axis), *flat],
+        [
+            *looked_at(motion, recordings),
+            *known_here(named, motion, stage.axis),
+            *or_else(retuned, named),
+            *flat,
+        ],
         motion.plain([s.time for s in motion.strips]),
         first.residual,
         final.residual,
@@ -292,22 +296,3 @@ def _candidates(decision: Decision, base: Fitted, sights: Sequence[Sight]) -> li
             found.append(Candidate(s.name, gain, z, at.seen, at.smallest, parameter=at.parameter))
     found += [Candidate(s.name, 0.0, math.nan, False) for s in from_size.values() if not s.seen]
     return sorted(found, key=lambda c: -c.gain)
-
-
-def _notes(motion: Motion, recordings: Sequence[Recording]) -> list[str]:
-    notes = [f"forces are compared below {motion.cut:.3g} Hz"]
-    rows = sum(len(r) for r in recordings)
-    if motion.seconds * motion.rate < 0.9 * rows * motion.rate / recordings[0].rate_hz:
-        notes.append(f"of {rows} rows, windows of {motion.seconds:.3g} s in all were looked at")
-    return notes
-
-
-def _known_here(named: list[Entry], motion: Motion, axis: str) -> list[str]:
-    """Say of forces along the way where they are known: what leads beyond asks for what nobody has seen."""
-    along = [str(e["name"]) for e in named if e["name"] in ALONG]
-    if not along:
-        return []
-    (low, high), unit = prefixed(for_axis("m", axis), *motion.stroke)
-    return [
-        f"{' and '.join(along)}: known from {low} to {high} {unit}, where this motion went, and not beyond"
-    ]

@@ -9,7 +9,7 @@ import numpy as np
 
 from rtcomp.kernels import Floats
 from rtcomp.trial.hidden import SECRETS, Rig, Secret, Sized
-from rtcomp.trial.oracle import Balance, Strength, balance, strength
+from rtcomp.trial.oracle import Bare, Strength
 from rtcomp.trial.plant import Run, simulate
 
 NEEDED = 1.0
@@ -64,7 +64,7 @@ def grow(secret: Secret, sized: Sized, rig: Rig, reference: Floats, clean: Run, 
     effect cannot be as strong, it stays at the most that leaves the axis controlled.
     """
     best: tuple[float, float, Grown] | None = None
-    bare = balance(rig.physics, rig.loop, clean, clean.position)
+    bare = Bare.of(rig.physics, rig.loop, clean)
     at, most = min(max(1.0, sized.least), sized.most), sized.most
     for _ in range(ROUNDS):
         changes, parameters = sized.at(at)
@@ -90,7 +90,7 @@ def grow(secret: Secret, sized: Sized, rig: Rig, reference: Floats, clean: Run, 
     return best[2]
 
 
-def _measure(rig: Rig, changes: dict[str, float], reference: Floats, bare: Balance) -> Strength | None:
+def _measure(rig: Rig, changes: dict[str, float], reference: Floats, bare: Bare) -> Strength | None:
     """Return the strength, or None where the controller loses the axis."""
     try:
         run = simulate(rig.physics._replace(**changes), rig.loop, reference, 1)
@@ -99,4 +99,4 @@ def _measure(rig: Rig, changes: dict[str, float], reference: Floats, bare: Balan
     lost = np.mean(np.abs(run.voltage) >= 0.999 * rig.physics.voltage_limit) > 0.02
     if lost or np.max(np.abs(run.truth)) > 2.0 * rig.stroke:
         return None
-    return strength(rig.physics, rig.loop, run, bare)
+    return bare.strength(run)

@@ -7,14 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rtcomp.trial.draw import Plan, draw
+from rtcomp.trial.draw import Case, Plan, draw
 from rtcomp.trial.friction import along, stop_elements, stops_along
-from rtcomp.trial.oracle import OFF, Balance, balance
+from rtcomp.trial.oracle import OFF, Balance, Bare, balance
+from rtcomp.trial.plant import simulate
 
 
 @pytest.fixture(scope="module")
-def seen() -> Balance:
-    case = draw(Plan("case", "clean", (), "full", 3))
+def case() -> Case:
+    return draw(Plan("case", "clean", (), "full", 3))
+
+
+@pytest.fixture(scope="module")
+def seen(case: Case) -> Balance:
     run = case.run("train")
     return balance(case.bare, case.loop, run, run.truth)
 
@@ -44,6 +49,27 @@ def test_mass_and_damping_are_taken_up_whatever_they_are(seen: Balance) -> None:
 def test_what_no_belief_has_is_not_taken_up(seen: Balance) -> None:
     time = np.arange(seen.residual.size) / 1000.0
     assert left(seen, np.sin(2 * np.pi * 13.7 * time)) > 0.8
+
+
+@pytest.mark.parametrize("rate", [500.0, 1000.0])
+def test_where_nothing_is_hidden_nothing_shows(case: Case, rate: float) -> None:
+    loop = case.loop._replace(rate=rate)
+    slow = replace(case, loop=loop)
+    clean, again = slow.run("train"), simulate(case.bare, loop, slow.reference("train"), 5)
+    shows = Bare.of(case.bare, loop, clean).strength(again)
+    assert shows.detectability(True) < 0.3 and shows.detectability(False) < 0.3
+
+
+@pytest.mark.parametrize("factor", [0.6, 1.5])
+def test_another_reach_is_a_retuning_however_far(case: Case, factor: float) -> None:
+    clean = case.run("train")
+    run = simulate(case.bare._replace(reach=factor * case.bare.reach), case.loop, case.reference("train"), 1)
+    bare = Bare.of(case.bare, case.loop, clean)
+    shows = bare.strength(run)
+    assert shows.detectability(True) > 10.0
+    assert shows.detectability(False) < 1.0  # stiffer contacts are sampled worse
+    by_tangent = balance(case.bare, case.loop, run, run.truth).retuned
+    assert np.sqrt(np.mean(by_tangent**2)) > 3.0 * bare.floor
 
 
 def test_stop_elements_add_up_to_the_smooth_friction() -> None:

@@ -8,7 +8,7 @@ import pytest
 from rtcomp.trial.draw import draw_stage, look
 from rtcomp.trial.hidden import SECRETS, Rig
 from rtcomp.trial.motion import draw_reference
-from rtcomp.trial.oracle import balance, strength
+from rtcomp.trial.oracle import Bare
 from rtcomp.trial.plant import Loop, Physics, Run, simulate
 
 PHYSICS = Physics(2.0, 4.0, 10.0, 8.0, 250.0, 5e-3, 4.0, 4e-5, 4.0)
@@ -82,18 +82,17 @@ def test_everything_that_can_be_hidden_changes_the_balance_and_grows_with_its_st
         base = base._replace(**secret.known(chance, rig)[0])
         clean = simulate(base, LOOP, clean.reference, 1)
     sized = secret.draw(chance, rig)
-    alone = balance(base, LOOP, clean, clean.position)
+    bare = Bare.of(base, LOOP, clean)
     shares = []
     for part in (0.3, 0.9):
         changes, _ = sized.at(max(part, sized.least) * min(1.0, sized.most))
         assert set(changes) <= set(Physics._fields)
         run = simulate(base._replace(**changes), LOOP, clean.reference, 1)
-        shows = strength(base, LOOP, run, alone)
+        shows = bare.strength(run)
         shares.append(shows.share if secret.retuning else shows.beyond)
-    bare = strength(base, LOOP, clean, alone)
-    nothing = bare.share if secret.retuning else bare.beyond
     assert shares[1] > shares[0] * 1.001 or sized.least >= 0.3
-    assert shares[1] > 1.02 * nothing
+    own = bare.share if secret.retuning else bare.beyond
+    assert shares[1] * bare.needed > 0.2 * own
 
 
 def test_scored_parameters_are_among_those_that_are_told() -> None:
