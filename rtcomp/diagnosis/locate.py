@@ -220,6 +220,7 @@ def _periodic(at: Wave, position: Axis, before: Floats, after: Floats | None) ->
         "position", position.unit, (low, high), at.share, at.p_value, at.says(position.unit),
         (0.5 * (edges[1:] + edges[:-1]))[kept], shown.means(residual)[kept],
         None if after is None else shown.means(after[inside])[kept], shown.spread(residual)[kept],
+        signed=at.odd,
     )  # fmt: skip
 
 
@@ -236,6 +237,7 @@ def _place(binned: Binned, share: float, p: float, before: Floats, after: Floats
     return Place(
         axis.name, axis.unit, region, share, p, _says(axis, region, share, mean, strong),
         centres[kept], mean[kept], later, binned.spread(before)[kept],
+        signed=axis.odd is not None,
     )  # fmt: skip
 
 

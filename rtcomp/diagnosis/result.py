@@ -70,6 +70,8 @@ class Place:
     """The same with the extended stage."""
     spread: Floats | None = None
     """Standard error of `before` (N)."""
+    signed: bool = False
+    """Whether forces are given the sign of the motion."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the place as the contract writes it."""

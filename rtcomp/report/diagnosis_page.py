@@ -23,7 +23,6 @@ from rtcomp.report.diagnosis_words import (
     joined,
     next_command,
     percent,
-    printed,
     probability,
     sentence,
     share_explained,
@@ -94,11 +93,7 @@ def diagnosed_page(found: Diagnosis, recordings: Sequence[str], stage: str, out:
     axis = found.stage.axis
     force, unit = for_axis("N", axis), for_axis("m", axis)
     best = max(found.where, key=lambda place: place.share, default=None)
-    where = (
-        [sentence(printed(best.says))]
-        if best is not None and best.says and found.verdict != "consistent"
-        else []
-    )
+    where = [sentence(best.says)] if best is not None and best.says and found.verdict != "consistent" else []
     return Page(
         title="What the simulation leaves out",
         subtitle=f"{joined(recordings, 'and')} against {stage}",
@@ -196,12 +191,13 @@ def _place(place: Place, force: str) -> Section:
     sign = "<" if place.p_value < 1e-3 else "="
     sure = f"p {sign} {max(place.p_value, 1e-3):.2g}, all axes looked at together"
     says = place.says or f"{percent(place.share)} of the mismatch depends on {place.axis}"
-    prose = sentence(f"{printed(says)} ({sure})")
+    prose = sentence(f"{says} ({sure})")
     figure = place_figure(
         place.axis, place.unit, place.x, place.before, after=place.after, spread=place.spread,
-        region=place.region, force_unit=force,
+        region=place.region, force_unit=force, signed=place.signed,
     )  # fmt: skip
-    return Section(f"Where: against {place.axis}", prose, figure)
+    heading = f"Where: against {place.axis}{', with the sign of the motion' if place.signed else ''}"
+    return Section(heading, prose, figure)
 
 
 def _in_time(found: Diagnosis, force: str) -> list[Section]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 
 from rtcomp import physics
@@ -87,11 +86,6 @@ def smallest(candidate: Candidate) -> str:
     unit = next((p.unit for p in known.parameters if p.name == name), "")
     how = "by " if candidate.name in OFF_BY else ""
     return f"{name} {how}{written(candidate.smallest, unit, 2, printed=True)}"
-
-
-def printed(says: str) -> str:
-    """Return a line for the terminal as the page has it: units typeset."""
-    return re.sub(r"(?<=\d )([numkM]?(?:m|rad|N|V|Hz|s)\b(?:/\w+(?:\^2)?)?)", lambda m: typeset(m[1]), says)
 
 
 def from_size(sight: Sight, axis: str, *, printed: bool) -> str:

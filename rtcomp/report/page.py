@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rtcomp.report import palette
 from rtcomp.report.columns import Columns, render_columns
-from rtcomp.report.quantities import written
+from rtcomp.report.quantities import printed, written
 from rtcomp.yamlfile import write_text
 
 if TYPE_CHECKING:
@@ -106,6 +106,10 @@ def _text(value: Any) -> str:
     return html.escape(str(value), quote=True)
 
 
+def _prose(sentences: str) -> str:
+    return _text(printed(sentences))
+
+
 def _if(text: str, tag: str, style: str) -> str:
     return f'<{tag} class="{style}">{_text(text)}</{tag}>\n' if text else ""
 
@@ -137,7 +141,7 @@ def _style() -> str:
 
 def _verdict(page: Page) -> str:
     sentences = [page.verdict] if isinstance(page.verdict, str) else list(page.verdict)
-    inner = "".join(f"<p>{_text(s)}</p>\n" for s in sentences if s)
+    inner = "".join(f"<p>{_prose(s)}</p>\n" for s in sentences if s)
     return f'<div class="verdict {page.tone}">\n{inner}</div>\n' if inner else ""
 
 
@@ -149,13 +153,13 @@ def _summary(rows: Sequence[Row]) -> str:
         value = written(row.value, row.unit, printed=True)
         cells.append(
             f'<tr><th scope="row">{_text(row.name)}</th><td class="value">{_text(value)}</td>'
-            f'<td class="note">{_text(row.note)}</td></tr>\n'
+            f'<td class="note">{_prose(row.note)}</td></tr>\n'
         )
     return f'<table class="summary">\n<tbody>\n{"".join(cells)}</tbody>\n</table>\n'
 
 
 def _notes(notes: Sequence[str]) -> str:
-    lines = "".join(f"<li>{_text(note[:1].upper() + note[1:])}</li>\n" for note in notes if note)
+    lines = "".join(f"<li>{_prose(note[:1].upper() + note[1:])}</li>\n" for note in notes if note)
     return f'<ul class="notes">\n{lines}</ul>\n' if lines else ""
 
 
@@ -170,7 +174,7 @@ def _sections(sections: Sequence[Section]) -> str:
     parts = []
     number = 0
     for index, section in enumerate(sections, 1):
-        prose = "".join(f"<p>{_text(p.strip())}</p>\n" for p in section.prose.split("\n\n") if p.strip())
+        prose = "".join(f"<p>{_prose(p.strip())}</p>\n" for p in section.prose.split("\n\n") if p.strip())
         drawing = ""
         if section.figure is not None:
             meta = section.figure.layout.meta or {}

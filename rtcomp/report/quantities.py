@@ -129,6 +129,11 @@ def typeset(unit: str) -> str:
     return unit.strip().replace(" ", "·")
 
 
+def printed(says: str) -> str:
+    """Return a sentence for the terminal as a page has it: units typeset."""
+    return re.sub(r"(?<=\d )([numkM]?(?:m|rad|N|V|Hz|s)\b(?:/\w+(?:\^2)?)?)", lambda m: typeset(m[1]), says)
+
+
 def written(value: Any, unit: str = "", digits: int = 3, *, printed: bool = False) -> str:
     """Return a table's cell: numbers by `si`, everything else as text with the unit behind it.
 

@@ -1,6 +1,6 @@
 """What a hidden effect does to the force balance: its strength, and whether it stands out of the noise.
 
-The balance here is the trial's own, on the plant's exact parameters: no diagnosis can do better.
+The balance here is the trial's own, on the plant's exact parameters, which no diagnosis has.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from rtcomp.diagnosis.result import Diagnosis, Named, Place, Value
 from rtcomp.report.columns import Columns, render_columns
 from rtcomp.report.diagnosis_page import diagnosed_page
 from rtcomp.report.diagnosis_text import diagnosis_text
-from rtcomp.report.diagnosis_words import printed, share_explained, within
+from rtcomp.report.diagnosis_words import share_explained, within
 from rtcomp.report.figures.candidates import Bar, candidates_figure, fit_figure
 from rtcomp.report.figures.residual import named_figure, place_figure, residual_figure
 from rtcomp.report.page import Page, Section, render_page, write_page
@@ -157,6 +157,17 @@ def test_a_rotary_axis_reads_in_its_units() -> None:
     assert figure.layout.xaxis.title.text == "Position (µrad)"
 
 
+def test_forces_with_the_sign_of_the_motion_are_told_from_those_as_they_are() -> None:
+    found = made_up.missing(0)
+    both = [replace(found.where[0], axis="position"), replace(found.where[0], axis="position", signed=True)]
+    page = page_of(replace(found, where=both))
+    plain, signed = (s for s in page.sections if s.heading.startswith("Where: against position"))
+    assert signed.heading == f"{plain.heading}, with the sign of the motion"
+    assert plain.figure is not None and signed.figure is not None
+    assert plain.figure.layout.yaxis.title.text == "Residual force (N)"
+    assert signed.figure.layout.yaxis.title.text == "Residual force, with the sign of the motion (N)"
+
+
 def test_an_effect_without_curve_or_parameters_and_a_place_without_after_are_shown() -> None:
     bare = Place("time", "s", (0.0, 1.0), 0.4, 0.0, "", np.arange(30.0), np.ones(30))
     found = replace(
@@ -274,16 +285,6 @@ def test_every_figure_is_drawn_in_a_browser(make: type, tmp_path: Path, dark: bo
     count = sum(1 for s in page.sections if s.figure is not None)
     assert root is not None and f'data-plots="{count}"' in root[0] and 'data-errors="0"' in root[0]
     assert "CONSOLE" not in run.stderr
-
-
-@pytest.mark.parametrize(("said", "shown"), [
-    ("period 99.7 um, both directions", "period 99.7 µm, both directions"),
-    ("between -47.2 and 57.3 mm/s^2", "between -47.2 and 57.3 mm/s²"),
-    ("a tone at 17 Hz", "a tone at 17 Hz"),
-    ("58 % of the mismatch", "58 % of the mismatch"),
-])  # fmt: skip
-def test_places_are_typeset_on_the_page(said: str, shown: str) -> None:
-    assert printed(said) == shown
 
 
 def test_within_the_noise_there_is_no_table_of_candidates_that_nobody_tried() -> None:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtcomp.report.quantities import scale, si, typeset, written
+from rtcomp.report.quantities import printed, scale, si, typeset, written
 
 POWER = {"f": -15, "p": -12, "n": -9, "u": -6, "m": -3, "": 0, "k": 3, "M": 6, "G": 9, "T": 12}
 UNITS = ["m", "N", "V", "s", "rad", "Hz", "m/s", "N/m", "N s/m", "N m"]
@@ -94,6 +94,17 @@ def test_an_axis_ignores_what_is_not_finite_and_survives_nothing() -> None:
 )
 def test_units_are_typeset(unit: str, shown: str) -> None:
     assert typeset(unit) == shown
+
+
+@pytest.mark.parametrize(("said", "shown"), [
+    ("period 99.7 um, both directions", "period 99.7 µm, both directions"),
+    ("between -47.2 and 57.3 mm/s^2", "between -47.2 and 57.3 mm/s²"),
+    ("a tone at 17 Hz", "a tone at 17 Hz"),
+    ("from -279 to 270 um, and not beyond; 3.2 N of 5", "from -279 to 270 µm, and not beyond; 3.2 N of 5"),
+    ("58 % of the mismatch", "58 % of the mismatch"),
+])  # fmt: skip
+def test_sentences_are_typeset_on_a_page(said: str, shown: str) -> None:
+    assert printed(said) == shown
 
 
 def test_cells_of_a_table() -> None:

@@ -29,17 +29,19 @@ def place_figure(
     spread: npt.ArrayLike | None = None,
     region: tuple[float, float] | None = None,
     force_unit: str = "N",
+    signed: bool = False,
 ) -> go.Figure:
     """Return the mean residual force along an axis (bins at `x`, in `unit`), before and after.
 
     `before` and `after` in `force_unit`, `spread` their standard error before; two of it are drawn to either
-    side. `region` shades where the mismatch shows. Raises ValueError where lengths differ.
+    side. `region` shades where the mismatch shows. Where `signed`, forces are given the sign of the motion,
+    and the axis says so. Raises ValueError where lengths differ.
     """
     at, first = c.floats(x), c.floats(before)
     second = None if after is None else c.floats(after)
     error = None if spread is None else c.floats(spread)
     c.same_length(x=at, before=first, after=second, spread=error)
-    along, up, figure = _axes(axis, unit, at, force_unit, [first, second])
+    along, up, figure = _axes(axis, unit, at, force_unit, [first, second], SIGNED if signed else FORCE)
     if c.say_if_empty(figure, [first, second]):
         return figure
     _zero(figure)
