@@ -35,6 +35,8 @@ MOVED = 0.02
 """Relative change of a parameter that is worth reporting."""
 SEVERAL = 3
 """Numbers that must have moved for it to be said that all did."""
+SAME = {"inertia": 0, "viscous-friction": 1}
+"""Columns of the base that entries are one number with."""
 FREEDOM, WIDE = 9, 2.262
 """Degrees of freedom of about ten blocks, and standard deviations of a 95 % interval from them (Student)."""
 
@@ -77,6 +79,8 @@ def covariance(refined: Refined) -> Floats:
     rows = ledger.seen[ledger.block]
     slack = 1e-6 * np.abs(c)
     free = (c > bounds.low + slack) & (c < bounds.high - slack)
+    # What is one number together is told by the knob: beside it the base's part of it says nothing.
+    free[[SAME[str(e["name"])] for e in refined.entries if e["name"] in SAME]] = False
     block = np.unique(ledger.block[rows], return_inverse=True)[1]
     count = int(block[-1]) + 1
     table = np.column_stack([j, fitted.system.columns[rows][:, free]])

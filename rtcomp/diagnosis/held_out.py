@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtcomp.diagnosis.motion import Motion
+from rtcomp.diagnosis.path import true_position
 from rtcomp.kernels import Floats
-from rtcomp.stage.balance import force_balance
+from rtcomp.stage.balance import balance_along
 from rtcomp.stage.stage import Stage
 
 
@@ -28,7 +29,11 @@ class HeldOut:
         off, power = np.zeros(len(aside)), 0.0
         start = 0
         for strip in motion.strips:
-            balance = force_balance(stage, strip.time, strip.position, strip.voltage, motion.cut)
+            # As in the fit: a jump of the sensor is no step any more where rows are smoothed or averaged.
+            position = true_position(
+                stage.chain, strip.time, strip.position, motion.averaged, motion.smoothed
+            )
+            balance = balance_along(stage, strip.time, position, strip.voltage, motion.cut)
             rows = motion.kept(strip)
             drive, needed = balance.force_drive[rows], balance.force_motion[rows]
             own = block[start : start + drive.size]

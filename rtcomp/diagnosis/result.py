@@ -245,7 +245,7 @@ class Diagnosis:
         if self.verdict == "consistent":
             return "Nothing is missing: simulation and recording agree within the noise."
         if self.verdict == "retuned":
-            moved = ", ".join(r.parameter for r in self.retuned)
+            moved = ", ".join(r.parameter for r in self.retuned) or "numbers that this motion does not part"
             return f"No physics is missing; other values of {moved} explain the recording."
         rest = " A part remains that no entry of the catalogue explains." if self._remains else ""
         if named:

@@ -188,9 +188,15 @@ def force_balance(
     measured, the velocity from below three times `bandwidth_hz`, and both sides are compared below it,
     forward and backward filtered: no delay. What the stage's sensor does to a reading is undone first.
     """
+    return balance_along(stage, time, true_position(stage, time, position), voltage, bandwidth_hz)
+
+
+def balance_along(
+    stage: Stage, time: Floats, position: Floats, voltage: Floats, bandwidth_hz: float | None = None
+) -> Balance:
+    """Return `force_balance` along a `position` (m) that is the true one, whatever the sensor does."""
     period = float((time[-1] - time[0]) / (time.size - 1))
     cut = bandwidth(1.0 / period) if bandwidth_hz is None else bandwidth_hz
-    position = true_position(stage, time, position)
     slow = zero_phase(position, min(3.0 * cut, 0.4 / period), 1.0 / period)
     velocity = np.gradient(slow, period)
     # Not smoothed twice: the comparison below takes out what noise adds above the bandwidth.

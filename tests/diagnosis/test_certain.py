@@ -66,6 +66,19 @@ def test_what_scales_all_numbers_leaves_them_as_open_as_itself_is() -> None:
     assert float(np.sqrt(covariance(refined)[0, 0])) * refined.knobs[0].step > 0.01
 
 
+def test_a_number_in_two_parts_is_as_certain_as_where_the_belief_holds_one_of_them() -> None:
+    """How viscous friction is shared between the base and the entry beside it is no matter of the sum."""
+    believed = axis()
+    motion = prepare(believed, [run(axis(viscous=16.0), there_and_back(8.0))])
+    refined = refine(fit_base(believed, motion), motion, [{"name": "viscous-friction", "coefficient": 7.0}])
+    bounds = refined.fitted.bounds
+    low, high = bounds.low.copy(), bounds.high.copy()
+    low[1], high[1] = 0.0, 20.0
+    shared = replace(refined, fitted=replace(refined.fitted, bounds=replace(bounds, low=low, high=high)))
+    assert bounds.low[1] < bounds.high[1] < 9.0
+    assert covariance(shared)[0, 0] == pytest.approx(covariance(refined)[0, 0], rel=0.3)
+
+
 def test_a_mass_that_is_another_is_told_with_an_interval_that_holds_it() -> None:
     true, believed = axis(mass=2.0 * 1.09), axis()
     motion = prepare(believed, [run(true, there_and_back(8.0))])
