@@ -68,7 +68,8 @@ def look_ahead(
         ahead, asked = beside(best), True
         left = float((ahead.best or best).errors.sum())
     for rival in rivals[:RIVALS]:
-        if asked and left < done and last(chosen) not in SHAPELESS:
+        bending = last(chosen) in SHAPELESS or _twice(chosen, ahead)
+        if asked and left < done and not bending:
             break
         other = beside(rival)
         both = other.best
@@ -83,7 +84,8 @@ def look_ahead(
             # A free curve and what goes with it are asked for only where nothing with a name does for both.
             ahead, asked = beside(best), True
             left = float((ahead.best or best).errors.sum())
-        if pair < most_left(last(chosen), last(both), left, enough if asked else done):
+        bending = last(chosen) in SHAPELESS or _twice(chosen, ahead)
+        if pair < most_left(bending, last(both), left, enough if asked else done):
             chosen, ahead, left, asked = rival, other, pair, True
     if not asked:
         ahead = beside(best)
@@ -91,10 +93,16 @@ def look_ahead(
     return replace(first, best=chosen, others=others), ahead
 
 
-def most_left(chosen: str, second: str, left: float, enough: float) -> float:
-    """Return the error that another first entry must reach, with `second` beside it, to replace `chosen`.
+def _twice(first: Refined, ahead: Addition | None) -> bool:
+    """Tell whether an entry has another of its name beside it: two waves bend to what is none, as curves do."""
+    return ahead is not None and ahead.best is not None and last(ahead.best) == last(first)
 
-    A free curve gives way to a name that does nearly as well, but not to one that needs the curve beside it.
+
+def most_left(bending: bool, second: str, left: float, enough: float) -> float:
+    """Return the error that another first entry must reach, with `second` beside it, to replace the chosen.
+
+    One that is `bending` to anything, a free curve or two waves, gives way to a name that does nearly as well,
+    but not to one that needs a curve beside it.
     """
-    spares = chosen in SHAPELESS and second not in SHAPELESS
+    spares = bending and second not in SHAPELESS
     return max(SHAPED * left, min(enough, SPARED * left)) if spares else TOGETHER * left

@@ -1,0 +1,58 @@
+"""Looking one entry ahead: what gives way to what, told by errors as a search would leave them."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rtcomp.diagnosis import look_ahead as looking
+from rtcomp.diagnosis.addition import Addition
+
+BLOCKS = 20
+
+
+def even(total: float) -> np.ndarray:
+    chance = np.random.default_rng(5).uniform(0.9, 1.1, BLOCKS)
+    return np.asarray(total * chance / chance.sum())
+
+
+def found(error: float, *names: str) -> Any:
+    """Entries refined together that leave `error`."""
+    errors = even(error)
+    return SimpleNamespace(
+        entries=[{"name": n} for n in names], errors=errors, fitted=SimpleNamespace(errors=errors)
+    )
+
+
+@pytest.mark.parametrize(
+    ("second", "left", "chosen"),
+    [
+        ("cogging", 0.18, "parallel-spring"),  # two waves bend to a spring with a push
+        ("stribeck", 0.18, "cogging"),  # two names that leave next to nothing need no others
+        ("cogging", 0.04, "cogging"),  # two waves that do better are two waves
+    ],
+)
+def test_two_waves_give_way_to_two_names_that_do_as_well(
+    monkeypatch: pytest.MonkeyPatch, second: str, left: float, chosen: str
+) -> None:
+    wave, spring = found(4.1, "cogging"), found(9.9, "parallel-spring")
+    beside = {
+        "cogging": found(left, "cogging", second),
+        "parallel-spring": found(0.06, "parallel-spring", "drive-offset"),
+    }
+
+    def best_addition(stage: Any, motion: Any, current: Any, entries: Any, *rest: Any) -> Addition:
+        return Addition(beside[entries[0]["name"]], [], [], {})
+
+    monkeypatch.setattr(looking, "best_addition", best_addition)
+    base: Any = SimpleNamespace(errors=even(58.0))
+    anything: Any = None
+    first = Addition(wave, [spring], [], {})
+    added, ahead = looking.look_ahead(
+        anything, anything, base, first, even(0.07), lambda part, what: None, frozenset()
+    )
+    assert added.best is not None and added.best.entries[-1]["name"] == chosen
+    assert ahead is not None and ahead.best is beside[chosen]
