@@ -19,10 +19,12 @@ NO_FURTHER = 1.0
 """How much further one number of another value may take the others than what scales all of them a little."""
 ALIKE = 0.06
 """Names are not told apart where they differ by less than this part of what the best explains."""
-PLAINER = {"asymmetric-viscous-friction": "viscous-friction"}
+PLAINER = {"asymmetric-viscous-friction": "viscous-friction", "resonance": "inertia"}
 """Entries that are another one and more,"""
 NEEDLESS = 1.25
-"""and the factor on their error up to which the plainer one is taken."""
+"""and the factor on their error up to which the plainer one is taken;"""
+LOOSE = 2.0
+"""Hz below which a mass hangs so loosely that it stays where it is: a resonance is another mass only there."""
 SHAPELESS = ("position-force",)
 """Entries that take any shape: a name with a shape of its own is preferred where it explains as much."""
 ONE_THING = (
@@ -44,13 +46,17 @@ def last(refined: Refined) -> str:
 def plainest(tried: Sequence[Refined]) -> list[Refined]:
     """Return the contenders, best first, without those of which a plainer one explains nearly as much."""
     errors = {last(r): float(r.errors.sum()) for r in tried}
-    needless = {
-        name
-        for name, plain in PLAINER.items()
-        if errors.get(plain, np.inf) < NEEDLESS * errors.get(name, 0.0)
-    }
-    kept = [r for r in tried if last(r) not in needless]
+    kept = [
+        r for r in tried
+        if errors.get(PLAINER.get(last(r), ""), np.inf) >= NEEDLESS * float(r.errors.sum()) or _rings(r)
+    ]  # fmt: skip
     return sorted(kept, key=lambda r: float(r.errors.sum()))
+
+
+def _rings(refined: Refined) -> bool:
+    """Tell whether the last entry is a second mass that does move."""
+    entry = refined.entries[-1]
+    return entry["name"] == "resonance" and float(entry["frequency"]) > LOOSE  # type: ignore[arg-type]
 
 
 def least_far(tried: Sequence[Refined], current: Fitted) -> Refined:

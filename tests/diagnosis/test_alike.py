@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from recorded import run
 from recorded import stage as axis
 
-from rtcomp.diagnosis.alike import bounded, last, least_far
+from rtcomp.diagnosis.alike import bounded, last, least_far, plainest
 from rtcomp.diagnosis.base import fit_base
 from rtcomp.diagnosis.certain import birge, intervals, neighbours
 from rtcomp.diagnosis.departure import USUAL, departure, off
@@ -40,6 +42,27 @@ def test_more_than_the_usual_departs_by_the_square_of_what_is_beyond() -> None:
     light = stage.with_changes(stage={"mass": float(fitted.coefficients[0] / np.exp(3.0 * USUAL))})
     ledger = replace(fitted.ledger, stage=light)
     assert departure(replace(fitted, ledger=ledger)) == pytest.approx(4.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("frequency", "mass_leaves", "kept"),
+    [
+        (0.7, 1.1, ["inertia"]),  # so loose that it stays where it is: that much less mass
+        (12.0, 1.1, ["resonance", "inertia"]),  # a second mass that moves
+        (0.7, 1.6, ["resonance", "inertia"]),  # as loose, but another mass does not do
+    ],
+)
+def test_a_resonance_that_hangs_loosely_is_another_mass(
+    frequency: float, mass_leaves: float, kept: list[str]
+) -> None:
+    def left(total: float, **entry: object) -> Any:
+        return SimpleNamespace(entries=[entry], errors=np.full(20, total / 20.0))
+
+    tried = [
+        left(1.0, name="resonance", frequency=frequency, damping=0.7, mass_ratio=0.3),
+        left(mass_leaves, name="inertia", mass=1.4),
+    ]
+    assert [last(r) for r in plainest(tried)] == kept
 
 
 def test_a_gain_is_estimated_as_well_as_the_belief_allows() -> None:
