@@ -24,7 +24,7 @@ PLAINER = {"asymmetric-viscous-friction": "viscous-friction", "resonance": "iner
 NEEDLESS = 1.25
 """and the factor on their error up to which the plainer one is taken;"""
 LOOSE = 2.0
-"""Hz below which a mass hangs so loosely that it stays where it is: a resonance is another mass only there."""
+"""Hz below which a second mass hangs so loosely that it stays where it is: that much less mass, no more."""
 SHAPELESS = ("position-force",)
 """Entries that take any shape: a name with a shape of its own is preferred where it explains as much."""
 ONE_THING = (
@@ -47,9 +47,10 @@ def plainest(tried: Sequence[Refined]) -> list[Refined]:
     """Return the contenders, best first, without those of which a plainer one explains nearly as much."""
     errors = {last(r): float(r.errors.sum()) for r in tried}
     kept = [
-        r for r in tried
+        r
+        for r in tried
         if errors.get(PLAINER.get(last(r), ""), np.inf) >= NEEDLESS * float(r.errors.sum()) or _rings(r)
-    ]  # fmt: skip
+    ]
     return sorted(kept, key=lambda r: float(r.errors.sum()))
 
 

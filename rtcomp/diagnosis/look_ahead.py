@@ -94,15 +94,15 @@ def look_ahead(
 
 
 def _twice(first: Refined, ahead: Addition | None) -> bool:
-    """Tell whether an entry has another of its name beside it: two waves bend to what is none, as curves do."""
+    """Tell whether an entry has another of its name beside it: two waves bend to anything, as curves do."""
     return ahead is not None and ahead.best is not None and last(ahead.best) == last(first)
 
 
 def most_left(bending: bool, second: str, left: float, enough: float) -> float:
     """Return the error that another first entry must reach, with `second` beside it, to replace the chosen.
 
-    One that is `bending` to anything, a free curve or two waves, gives way to a name that does nearly as well,
-    but not to one that needs a curve beside it.
+    One that is `bending` to anything, a free curve or two waves, gives way to a name that does nearly as
+    well, but not to one that needs a curve beside it.
     """
     spares = bending and second not in SHAPELESS
     return max(SHAPED * left, min(enough, SPARED * left)) if spares else TOGETHER * left

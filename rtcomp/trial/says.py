@@ -26,7 +26,8 @@ ALIASES: dict[str, frozenset[str]] = {
 """Names that no recording of one axis tells from the truth, the truth included."""
 FRICTION = frozenset({"friction", "friction_level", "friction-level", "friction_reach", "friction_shape"})
 RETUNED: dict[str, frozenset[str]] = {
-    "drive-gain": frozenset({"force_constant"}) | FRICTION,
+    # A recording sees only what moves per volt: whichever of the numbers leaves what beliefs allow.
+    "drive-gain": frozenset({"force_constant", "mass", "viscous"}) | FRICTION,
     "inertia": frozenset({"mass"}),
     "viscous-friction": frozenset({"viscous"}),
     "back-emf": frozenset({"viscous"}),

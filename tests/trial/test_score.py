@@ -61,6 +61,8 @@ COGGING = case("one", hidden("cogging", period=1e-3))
         (case("one", hidden("inertia")), said("retuned", moved=("mass",)), True, True, True),
         (case("one", hidden("inertia")), said("retuned", moved=("viscous",)), False, False, False),
         (case("one", hidden("drive-gain")), said("retuned", moved=("friction",)), True, True, True),
+        (case("one", hidden("drive-gain")), said("retuned", moved=("mass",)), True, True, True),
+        (case("one", hidden("drive-gain")), said("retuned", moved=("micro_damping",)), False, False, False),
         (case("one", hidden("stribeck")), said("retuned", moved=("stribeck",)), True, True, True),
     ],
 )  # fmt: skip
