@@ -58,8 +58,9 @@ OPEN = 4.0
 """Squared error over the floor's, from which on something remains that no entry explains."""
 LOUD = 0.03
 """Relative force error left by noise and method, from which on forces decide nothing where an axis sticks."""
-KEPT = 0.9
-"""Factor on the held-out error below which a retuned stage is given in place of the believed one."""
+KEPT, CLEARLY = 0.9, 0.7
+"""Factors on the held-out error below which a retuned stage is given in place of the believed one: in general,
+and where nothing is missing."""
 ROUGH = (0.75, 1.0, 1.3)
 """Factors on the believed reaches with which the place of the mismatch is looked for at first."""
 
@@ -131,6 +132,10 @@ def diagnose(
     verdict = _verdict(effects, final, floor, least, fit, folded)
     if verdict == "consistent":
         where = []
+        if fit.before < 1.5 * fit.floor or fit.after > CLEARLY * fit.before:
+            # Numbers bent to noise predict other motion worse than the believed ones.
+            extended = believed
+            fit = Fit(fit.before, fit.retuned, fit.before, fit.floor)
     elif verdict == "unexplained" and not effects:
         effects = [Named(("unexplained",), 1.0, {}, 1.0)]
     if any(e.names == ("unexplained",) for e in effects):

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rtcomp.diagnosis.diagnose import ALONG, diagnose
+from rtcomp.diagnosis.diagnose import diagnose
+from rtcomp.diagnosis.notes import ALONG
 from rtcomp.diagnosis.result import Diagnosis
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
@@ -51,6 +52,18 @@ def test_nothing_is_named_where_nothing_is_missing() -> None:
     done = diagnosed(None)
     assert done.verdict == "consistent"
     assert not done.effects
+
+
+@pytest.mark.parametrize(("damping", "bent"), [(258.0, False), (280.0, True)])
+def test_where_nothing_is_missing_numbers_stay_unless_others_do_clearly_better(
+    damping: float, bent: bool
+) -> None:
+    """A little less error than noise leaves is noise that numbers were bent to."""
+    believed, recording = recorded(None, micro_damping=damping)
+    done = diagnose(believed, [recording])
+    assert done.verdict == "consistent" and done.fit.retuned < 0.9 * done.fit.before
+    assert (done.stage.to_dict() != believed.to_dict()) == bent
+    assert (done.fit.after < done.fit.before) == bent
 
 
 @pytest.mark.slow
