@@ -59,8 +59,8 @@ OPEN = 4.0
 LOUD = 0.03
 """Relative force error left by noise and method, from which on forces decide nothing where an axis sticks."""
 KEPT, CLEARLY = 0.9, 0.7
-"""Factors on the held-out error below which a retuned stage is given in place of the believed one: in general,
-and where nothing is missing."""
+"""Factors on the held-out error below which a retuned stage is given in place of the believed one: in
+general, and where nothing is missing."""
 ROUGH = (0.75, 1.0, 1.3)
 """Factors on the believed reaches with which the place of the mismatch is looked for at first."""
 
