@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rtcomp_drivers.quality import LEAST, SHARE, WINDOW_S, LinkQuality
 
 
+LATE = [(True, 0.0), *[(False, 0.03125)] * 6, *[(False, 0.046875)] * 3, (False, 0.03125)]
+
+
 @settings(deadline=None)
 @given(st.lists(st.tuples(st.booleans(), st.floats(0.0, 0.05)), max_size=400))
+@example([*LATE, *[(True, 0.03125)] * 2, *[(True, 0.046875)] * 2])
 def test_it_never_fails_where_any_longer_stretch_is_good(frames):
     """Where no half second holds five bad frames, the link is good, however the good ones fall."""
     quality, now = LinkQuality(), 0.0
