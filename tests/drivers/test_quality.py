@@ -6,7 +6,6 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rtcomp_drivers.quality import LEAST, SHARE, WINDOW_S, LinkQuality
 
-
 LATE = [(True, 0.0), *[(False, 0.03125)] * 6, *[(False, 0.046875)] * 3, (False, 0.03125)]
 
 
