@@ -22,8 +22,8 @@ class LinkQuality:
             recent = now - self._begin < WINDOW_S
             self._older_good, self._older_bad = (self._good, self._bad) if recent else (0, 0)
             self._good = self._bad = 0
-            # On a grid: begun where a frame happens to come, two halves could be longer than the window.
-            self._begin = now - (now - self._begin) % half
+            # Right after the last half: begun where a frame happens to come, two could outlast the window.
+            self._begin = self._begin + half if recent else now
         self._good += good
         self._bad += bad
         all_bad = self._bad + self._older_bad

@@ -67,6 +67,7 @@ class Stopped:
                 if not log.is_file() or (outcomes[name].well and not answer.is_dir()):
                     del outcomes[name]
                     continue
-                shutil.copy(log, out / step / log.name)
                 if answer.is_dir():
                     shutil.copytree(answer, out / step / name)
+                # Last: without it an answer counts as lost, were this stopped in the middle of one.
+                shutil.copy(log, out / step / log.name)

@@ -132,7 +132,7 @@ def test_a_trial_that_is_stopped_again_while_drawing_loses_nothing(tmp_path: Pat
     command = [*RTCOMP, "trial", "--out", str(out), "--resume", str(kept), "--rivals", "none"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as run:
         until = time.monotonic() + 60.0
-        while not (out / "diagnoses" / answered[0]).exists() and time.monotonic() < until:
+        while not (out / "diagnoses" / f"{answered[0]}.log").exists() and time.monotonic() < until:
             time.sleep(0.02)
         assert not any((out / "cases").glob("*/train.csv.gz"))
         run.send_signal(signal.SIGTERM)
