@@ -17,7 +17,7 @@ demo: $(RUN) ## identify, compensate, hide an effect and find it; leaves out/dem
 	$(BIN)/rtcomp demo --out out/demo --force $(ARGS)
 
 test: $(DEV) ## every quick test
-	$(BIN)/python -m pytest -m "not slow" $(ARGS)
+	$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadfile $(ARGS)
 
 prove: $(DEV) ## the proofs that take long
 	$(BIN)/python -m pytest -m slow $(ARGS)

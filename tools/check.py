@@ -18,7 +18,7 @@ CHECKS = {
     "format": [sys.executable, "-m", "ruff", "format", "--check", "."],
     "types": [sys.executable, "-m", "mypy"],
     "layers": [str(BIN / "lint-imports")],
-    "tests": [sys.executable, "-m", "pytest", "-m", "not slow"],
+    "tests": [sys.executable, "-m", "pytest", "-m", "not slow", "-n", "2", "--dist", "loadfile"],
 }
 
 
