@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
 import pytest
 
+from rtcomp.errors import RtcompError
 from rtcomp.trial.run import Outcome
 from rtcomp.trial.stopped import Stopped
 
@@ -31,3 +33,20 @@ def test_an_answer_that_was_lost_is_asked_for_again_and_not_scored_as_failed(
     brought = ["case0"] if lost else ["case0", "case1"]
     assert list(so_far.ended["diagnoses"]) == brought
     assert sorted(p.name for p in (out / "diagnoses").iterdir() if p.is_dir()) == brought
+
+
+@pytest.mark.parametrize(
+    "published",
+    [None, "{", '{"commitments": {"case0": "ab"}}', '{"commitments": {"case0": "ab", "case2": "cd"}}'],
+)
+def test_what_was_sealed_must_be_there_whole(published: str | None, tmp_path: Path) -> None:
+    salts = {"case0": "01", "case1": "02"}
+    Stopped(2, 7, salts=salts).write(tmp_path)
+    (tmp_path / "commitments.json").write_text(json.dumps({"commitments": dict.fromkeys(salts, "ab")}))
+    assert Stopped.read(tmp_path).salts == salts
+    if published is None:
+        (tmp_path / "commitments.json").unlink()
+    else:
+        (tmp_path / "commitments.json").write_text(published)
+    with pytest.raises(RtcompError, match=r"stopped\.json or commitments\.json is missing or damaged"):
+        Stopped.read(tmp_path)
