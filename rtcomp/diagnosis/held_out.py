@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtcomp.diagnosis.motion import Motion
-from rtcomp.diagnosis.path import true_position
 from rtcomp.kernels import Floats
 from rtcomp.stage.balance import balance_along
+from rtcomp.stage.sensed import true_position
 from rtcomp.stage.stage import Stage
 
 

@@ -9,12 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtcomp.diagnosis.motion import Motion, Strip
-from rtcomp.kernels import Floats, call_effect, compiled
-from rtcomp.physics import Effect, Place
+from rtcomp.kernels import Floats, compiled
+from rtcomp.physics import Effect
 from rtcomp.physics.coupled import contact
-from rtcomp.physics.rows import new_rows
-from rtcomp.physics.wires import SENSED, STEP, TIME
-from rtcomp.stage.lowpass import zero_phase
+from rtcomp.stage.sensed import true_position
 
 FINE = 0.3
 """Longest sub-step (rad) of the load's oscillation behind a play."""
@@ -87,48 +85,3 @@ def _drawn(
             y += h * u
         out[k] = y
     return out
-
-
-def true_position(
-    effects: Sequence[Effect], time: Floats, measured: Floats, averaged: int = 1, smoothed: float = 0.0
-) -> Floats:
-    """Return the position (m) behind a measured one: the sensor effects undone, last first.
-
-    In rows that are means over so many of the recording, which was smoothed from so many Hz on (0: was not),
-    a jump of the sensor is no step either.
-    """
-    sensors = sorted((e for e in effects if e.place is Place.SENSOR), key=lambda e: -e.order)
-    if not sensors:
-        return measured
-    rows = new_rows(measured.size)
-    rows[:, TIME], rows[:, SENSED] = time, measured
-    rows[:, STEP] = np.gradient(time)
-    for effect in sensors:
-        if effect.inverse is None:
-            from scipy.interpolate import CubicSpline
-
-            late = float(effect.values.get("delay", 0.0))
-            rows[:, SENSED] = CubicSpline(time, rows[:, SENSED])(np.minimum(time + late, time[-1]))
-            continue
-        p, state = np.append(effect.vector(), 0.0), np.append(effect.initial_state(), 0.0)
-        if effect.name == "sensor-jump" and (averaged > 1 or smoothed > 0.0):
-            rows[:, SENSED] -= effect.values["size"] * _after(effect.values["time"], time, averaged, smoothed)
-            continue
-        _undo(effect.inverse.address, p, state, rows)
-    return np.ascontiguousarray(rows[:, SENSED])
-
-
-def _after(moment: float, time: Floats, averaged: int, smoothed: float) -> Floats:
-    """Return what became of a step at `moment` (s) from 0 to 1 on its way to the rows at `time` (s, (K,))."""
-    period = float(time[1] - time[0])
-    share = ((np.arange(averaged) + 0.5) / averaged - 0.5) * period
-    after = (time[:, np.newaxis] + share >= moment).astype(np.float64).ravel()
-    if smoothed > 0.0:
-        after = zero_phase(after, smoothed, averaged / period)
-    return np.asarray(after.reshape(-1, averaged).mean(axis=1))
-
-
-@compiled
-def _undo(address: int, p: Floats, state: Floats, rows: Floats) -> None:
-    for k in range(rows.shape[0]):
-        call_effect(address, p.ctypes.data, state.ctypes.data, rows[k].ctypes.data)

@@ -27,14 +27,13 @@ from rtcomp.physics.wires import (
     MOVED,
     POSITION,
     PUSH,
-    SENSED,
     STEP,
     TIME,
     VELOCITY,
     VOLTS,
 )  # fmt: skip
 from rtcomp.stage import lowpass
-from rtcomp.stage.inverse import undone
+from rtcomp.stage.sensed import true_position
 from rtcomp.stage.stage import Stage
 
 STEADY = {"drive-offset", "drive-deadband", "drive-saturation", "drive-gain", "drive-force"}
@@ -188,7 +187,7 @@ def force_balance(
     measured, the velocity from below three times `bandwidth_hz`, and both sides are compared below it,
     forward and backward filtered: no delay. What the stage's sensor does to a reading is undone first.
     """
-    return balance_along(stage, time, true_position(stage, time, position), voltage, bandwidth_hz)
+    return balance_along(stage, time, true_position(stage.chain, time, position), voltage, bandwidth_hz)
 
 
 def balance_along(
@@ -213,24 +212,6 @@ def balance_along(
     ).drive
     given = 0.5 * (over + np.append(over[1:], over[-1:]))
     return Balance(zero_phase(given, cut, 1.0 / period), zero_phase(needed, cut, 1.0 / period), cut)
-
-
-def true_position(stage: Stage, time: Floats, reading: Floats) -> Floats:
-    """Return the position (m, (K,)) that the stage's sensor would have read as `reading`.
-
-    The inverses of the sensor's effects, last first; a late reading is read where it was taken, by cubic
-    interpolation, the last reading standing for those that were still to come. Noise and rounding stay.
-    """
-    position = np.array(reading, dtype=np.float64)
-    for effect in reversed([e for e in stage.chain if e.place is Place.SENSOR]):
-        delay = effect.values.get("delay", 0.0)
-        if effect.inverse is not None:
-            position = undone(effect, time, position, SENSED)
-        elif delay > 0.0:
-            from scipy.interpolate import CubicSpline
-
-            position = CubicSpline(time, position)(np.minimum(time + delay, time[-1]))
-    return position
 
 
 def around_rows(force: Floats) -> Floats:

@@ -8,8 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rtcomp.diagnosis.jumps import jumps
-from rtcomp.diagnosis.path import true_position
-from rtcomp.physics import build
 from rtcomp.recording.outliers import answers, outliers
 from rtcomp.stage.lowpass import zero_phase
 
@@ -49,26 +47,6 @@ def test_what_the_motion_does_stands_out_less_than_a_jump_of_a_few_counts(
     x[row:] += sign * 2e-6
     found = [size for at, size in jumps(time, np.round(x / 1e-7) * 1e-7) if time[row - 1] < at < time[row]]
     assert found == [pytest.approx(sign * 2e-6, abs=5e-7)]
-
-
-def test_means_over_rows_have_the_jump_within_them() -> None:
-    time, x = moved(rows=3000)
-    jumped = x + 3e-6 * (time >= 1.0005)
-    effect = build({"name": "sensor-jump", "size": 3e-6, "time": 1.0005})
-    mean = [a.reshape(-1, 3).mean(axis=1) for a in (time, jumped, x)]
-    assert true_position([effect], mean[0], mean[1], 3) == pytest.approx(mean[2], abs=1e-12)
-
-
-def test_smoothed_counts_have_the_jump_as_smooth_as_they_are() -> None:
-    time, x = moved(rows=3000)
-    jumped = x + 8e-5 * (time >= 1.0005)
-    effect = build({"name": "sensor-jump", "size": 8e-5, "time": 1.0005})
-    mean = [
-        a.reshape(-1, 2).mean(axis=1)
-        for a in (time, zero_phase(jumped, 120.0, 1e3), zero_phase(x, 120.0, 1e3))
-    ]
-    assert true_position([effect], mean[0], mean[1], 2, 120.0) == pytest.approx(mean[2], abs=1e-12)
-    assert np.abs(true_position([effect], mean[0], mean[1], 2) - mean[2]).max() > 5e-6
 
 
 def test_a_step_that_the_controller_takes_back_is_no_outlier_but_a_spike_is() -> None:

@@ -14,7 +14,6 @@ from rtcomp.stage.balance import (
     force_balance,
     forces,
     known_force,
-    true_position,
     zero_phase,
 )
 from rtcomp.stage.simulate import Simulator
@@ -154,28 +153,6 @@ def test_known_force_keeps_friction_that_is_listed_beside_the_model():
     t = np.arange(100) * 1e-3
     v = np.linspace(-0.05, 0.05, 100)
     assert np.allclose(known_force(stage, t, 0 * v, v), 400.0 * np.abs(v) * v, rtol=0, atol=1e-12)
-
-
-def test_the_sensor_is_undone_in_reverse_order_and_its_delay_by_looking_ahead():
-    effects = [
-        {"name": "sensor-delay", "delay": 2.3e-3},
-        {"name": "sensor-scale", "scale": 1.02},
-        {"name": "sensor-periodic-error", "amplitude": 1e-6, "period": 5e-5},
-        {"name": "sensor-drift", "drift": 3e-5, "time_constant": 0.7},
-        {"name": "sensor-jump", "size": -2e-5, "time": 0.5004},
-    ]
-    stage = QUIET.with_changes(stage={"effects": effects})
-    t = np.arange(2000) / 1000.0
-    late = 3e-4 * np.sin(2 * np.pi * 2.0 * (t - 2.3e-3))
-    scaled = late / 1.02
-    reading = (
-        scaled + 1e-6 * np.sin(2 * np.pi * scaled / 5e-5) + 3e-5 * (1 - np.exp(-t / 0.7)) - 2e-5 * (t > 0.5)
-    )
-    expected = 3e-4 * np.sin(2 * np.pi * 2.0 * t)
-    found = true_position(stage, t, reading)
-    assert np.abs(found - expected)[:-3].max() < 1e-10
-    assert np.all(found[-2:] == found[-2])
-    assert np.array_equal(true_position(QUIET, t, reading), reading)
 
 
 @pytest.mark.parametrize("following", [0.0, 1.0])

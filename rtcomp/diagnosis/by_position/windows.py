@@ -17,7 +17,8 @@ from rtcomp.diagnosis.motion import BLOCKS, UNSEEN
 from rtcomp.kernels import Floats
 from rtcomp.physics import Place
 from rtcomp.recording.reader import Recording
-from rtcomp.stage.balance import true_position, zero_phase
+from rtcomp.stage.balance import zero_phase
+from rtcomp.stage.sensed import true_position
 from rtcomp.stage.shoot import shoot
 from rtcomp.stage.stage import Stage
 
@@ -106,8 +107,8 @@ class Windows:
             at += starts.size
             if not mine.size:
                 continue
-            position = true_position(stage, track.time, track.position) if sensors else track.position
-            reading = true_position(stage, track.time, track.reading) if sensors else track.reading
+            position = true_position(stage.chain, track.time, track.position) if sensors else track.position
+            reading = true_position(stage.chain, track.time, track.reading) if sensors else track.reading
             velocity = np.gradient(position, track.time)
             went = shoot(stage, track.time, position, velocity, track.voltage, mine, self.rows, COARSE)
             found.append(went - reading[mine[:, None] + np.arange(self.rows)])
