@@ -10,7 +10,7 @@ import numpy as np
 from rtcomp import physics
 from rtcomp.diagnosis.blocks import Bounds
 from rtcomp.diagnosis.cores import shared
-from rtcomp.diagnosis.ledger import BIASES, WHOLE, Ledger, System, grid_of
+from rtcomp.diagnosis.ledger import BIASES, MASS, MICRO, VISCOUS, WHOLE, Ledger, System, grid_of
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.remembered import Memory
 from rtcomp.kernels import Floats
@@ -23,10 +23,13 @@ SCALES = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.12, 1.25, 1.4, 1.6, 1.8)
 """Factors tried on the reaches of the friction grid."""
 FINER = (0.94, 0.97, 1.03, 1.06)
 """Factors on the best of them that are tried next, where that is not the believed one."""
-RELEASED = {"asymmetric-viscous-friction": "viscous"}
+RELEASED = {"asymmetric-viscous-friction": VISCOUS}
 """Entries that say how a believed number differs by direction, so that it may not be what was believed."""
-FIXED = 3
-"""Columns before those of friction: mass, viscous, micro-damping."""
+NUMBERS = (MASS, VISCOUS, MICRO)
+"""Believed numbers whose columns come before those of friction."""
+FIXED = len(NUMBERS)
+ENTRY_OF = {MASS: "inertia", VISCOUS: "viscous-friction"}
+"""Entries of the catalogue that are a change of one of them."""
 
 
 def bounds_of(stage: Stage, size: int, slack: float = BELIEVED, names: Sequence[str] = ()) -> Bounds:
@@ -40,8 +43,7 @@ def bounds_of(stage: Stage, size: int, slack: float = BELIEVED, names: Sequence[
     released = {RELEASED[n] for n in names if n in RELEASED}
     biased = any(e.get("name") in BIASES for e in m.effects)
     low, high = np.zeros(size), np.full(size, np.inf)
-    own = {"mass": stage.mass, "viscous": m.viscous, "micro_damping": m.micro_damping}
-    for i, (name, value) in enumerate(own.items()):
+    for i, (name, value) in enumerate(zip(NUMBERS, (stage.mass, m.viscous, m.micro_damping), strict=True)):
         if name in released:
             low[i] = 0.0
         else:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtcomp.diagnosis.base import BELIEVED, FIXED, Fitted, fit_base
+from rtcomp.diagnosis.base import BELIEVED, ENTRY_OF, FIXED, NUMBERS, Fitted, fit_base
 from rtcomp.diagnosis.blocks import Blocks
 from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.cores import shared
@@ -35,8 +35,6 @@ MOVED = 0.02
 """Relative change of a parameter that is worth reporting."""
 SEVERAL = 3
 """Numbers that must have moved for it to be said that all did."""
-SAME = {"inertia": 0, "viscous-friction": 1}
-"""Columns of the base that entries are one number with."""
 FREEDOM, WIDE = 9, 2.262
 """Degrees of freedom of about ten blocks, and standard deviations of a 95 % interval from them (Student)."""
 
@@ -80,7 +78,8 @@ def covariance(refined: Refined) -> Floats:
     slack = 1e-6 * np.abs(c)
     free = (c > bounds.low + slack) & (c < bounds.high - slack)
     # What is one number together is told by the knob: beside it the base's part of it says nothing.
-    free[[SAME[str(e["name"])] for e in refined.entries if e["name"] in SAME]] = False
+    named = {str(e["name"]) for e in refined.entries}
+    free[:FIXED] &= [ENTRY_OF.get(number) not in named for number in NUMBERS]
     block = np.unique(ledger.block[rows], return_inverse=True)[1]
     count = int(block[-1]) + 1
     table = np.column_stack([j, fitted.system.columns[rows][:, free]])

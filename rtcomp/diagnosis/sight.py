@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rtcomp.diagnosis.base import Fitted
+from rtcomp.diagnosis.base import ENTRY_OF, Fitted
 from rtcomp.diagnosis.blocks import Blocks, Bounds
 from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.ledger import BIAS, BIASES, MASS, VISCOUS, Ledger
@@ -60,17 +60,13 @@ def sight(motion: Motion, final: Fitted, entries: Sequence[Entry], floor: Floats
     return found
 
 
-BASE_OF = {"mass": "inertia", "viscous": "viscous-friction"}
-"""Parameters of the stage whose change is an entry of the catalogue."""
-
-
 def pinned(retuned: list[Retuned], sights: Sequence[Sight]) -> tuple[list[Retuned], list[str]]:
     """Return what moved by so much that this motion shows it, and a note for each that it leaves open."""
     from_size = {s.name: s.smallest for s in sights}
     flat = [
         r
         for r in retuned
-        if abs(r.after.value - r.before) < 0.5 * from_size.get(BASE_OF.get(r.parameter, ""), 0.0)
+        if abs(r.after.value - r.before) < 0.5 * from_size.get(ENTRY_OF.get(r.parameter, ""), 0.0)
     ]
     notes = [
         f"{r.parameter} is not pinned by this motion: the stage's is as good as any like it" for r in flat
