@@ -18,6 +18,8 @@ STEADY = 0.8
 """Part of the blocks in which it must do no harm,"""
 AMENDS = 0.15
 """unless all harm together is less than this part of what it gains: two effects may hide in each other."""
+FEW = 3
+"""Blocks that must gain."""
 ABOVE_FLOOR = 1.6
 """Squared error over the floor's, below which nothing is missing."""
 NEAR = 2.5
@@ -66,7 +68,7 @@ def worth_it(before: Floats, after: Floats, floor: Floats) -> bool:
     helped = int(np.count_nonzero(gained > 0.05 * before))
     scatter = float(gained.std(ddof=1) / np.sqrt(gained.size))
     excess = float(before.sum() - floor.sum())
-    broad = helped >= 3 and (float(gained.mean()) > 1.2 * scatter or helped > 0.4 * gained.size)
+    broad = helped >= FEW and (float(gained.mean()) > 1.2 * scatter or helped > 0.4 * gained.size)
     plain = share > 0.5 and float(gained.sum()) > 5.0 * float(floor.sum())
     throughout = helped >= 0.8 * gained.size and float(gained.sum()) > 0.5 * excess
     return (
@@ -93,6 +95,20 @@ def stands_out(before: Floats, after: Floats, distinct: float = DISTINCT) -> boo
         float(gained.sum()) > distinct * float(before.sum())
         and float(ratio.mean()) > DOUBTLESS * doubt
         and float(np.mean(gained > 0.05 * before)) >= MOST_BLOCKS
+    )
+
+
+def is_the_rest(before: Floats, after: Floats, floor: Floats) -> bool:
+    """Tell whether the step from `before` to `after` is most of what is left, in some blocks, at no harm.
+
+    So it is with one number that names had to do for: where it matters it is gone, elsewhere nothing is.
+    """
+    gained = before - after
+    total, whole = float(gained.sum()), float(before.sum())
+    return (
+        total > max(DISTINCT * whole, MOST_OF_IT * (whole - float(floor.sum())))
+        and int(np.count_nonzero(gained > 0.05 * before)) >= FEW
+        and -float(np.minimum(gained, 0.0).sum()) < AMENDS * total
     )
 
 

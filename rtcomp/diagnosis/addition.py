@@ -222,15 +222,15 @@ def settle(
     beside = (around * f for f in (0.8, 0.9, 1.0, 1.12, 1.25))
     # Where a recording says nothing of reaches, they would go further every time.
     near = tuple(sorted({1.0, *(min(max(scale, SCALES[0]), SCALES[-1]) for scale in beside)}))
-    memory = refined.fitted.ledger.memory
-    base = fit_base(stage, motion, effects, tuple(sorted({around, *(scales or near)})), memory)
+    memory, freed = refined.fitted.ledger.memory, refined.fitted.freed
+    base = fit_base(stage, motion, effects, tuple(sorted({around, *(scales or near)})), memory, freed)
     found = refine(base, motion, refined.entries, searching=True)
     for _ in range(AGREE):
         if _agrees(found):
             break
         # Sizes refined on friction that is not the one found beside them hold for neither.
         effects = [effect_of(e) for e in found.entries]
-        base = fit_base(stage, motion, effects, (found.fitted.scale,), memory)
+        base = fit_base(stage, motion, effects, (found.fitted.scale,), memory, freed)
         found = refine(base, motion, found.entries, tries=4, searching=True)
     return found
 

@@ -13,6 +13,10 @@ from rtcomp.kernels import Floats
 
 APART = 1.6
 """Factor on the error with the best name, beyond which another name is told apart from it."""
+STEADILY, CLEARLY = 1.15, 4.0
+"""That factor where nearly every block has it: standard errors of its logarithm."""
+LATE = ("drive-delay", "drive-lag", "sensor-delay")
+"""Entries that differ by how rows sample them: which does better need not be right."""
 FURTHER = 3.0
 """How much further (see `departure`) a name may take the believed numbers than the best one."""
 NO_FURTHER = 1.0
@@ -109,6 +113,16 @@ def _one_number(refined: Refined, nearest: float) -> bool:
     return last(refined) in ONE_NUMBER and departure(refined.fitted) < nearest + NO_FURTHER
 
 
+def steadily_worse(best: Floats, other: Floats) -> bool:
+    """Tell whether one entry leaves more (squared errors of blocks) than another, by a little but everywhere.
+
+    What differs in total may be an accident of the loudest blocks; what differs in each is none.
+    """
+    ratio = np.log(np.maximum(other, 1e-300) / np.maximum(best, 1e-300))
+    doubt = float(ratio.std(ddof=1) / np.sqrt(ratio.size))
+    return float(other.sum()) > STEADILY * float(best.sum()) and float(ratio.mean()) > CLEARLY * doubt
+
+
 def alike(best: Refined, rest: Sequence[Refined], current: Fitted, floor: Floats) -> tuple[list[str], float]:
     """Return all names that explain as much as the best one, likeliest first, and the best one's share."""
     reduction = current.errors - best.errors
@@ -120,6 +134,8 @@ def alike(best: Refined, rest: Sequence[Refined], current: Fitted, floor: Floats
         if name in SHAPELESS or name in names:
             continue
         if float(other.errors.sum()) > most or departure(other.fitted) > away:
+            continue
+        if steadily_worse(best.errors, other.errors) and not {name, names[0]} <= set(LATE):
             continue
         worse = other.errors - best.errors
         scatter = float(worse.std(ddof=1) * np.sqrt(worse.size))

@@ -17,8 +17,9 @@ from rtcomp.kernels import Floats
 from rtcomp.physics import Effect
 from rtcomp.stage.stage import Stage
 
-BELIEVED = 0.12
-"""How far off mass, viscous friction and micro-damping may be before that is a finding of its own."""
+BELIEVED, FREED = 0.12, 0.6
+"""How far off mass, viscous friction and micro-damping may be before that is a finding of its own; and how
+far where a recording has shown that one of them is further off."""
 SCALES = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.12, 1.25, 1.4, 1.6, 1.8)
 """Factors tried on the reaches of the friction grid."""
 FINER = (0.94, 0.97, 1.03, 1.06)
@@ -32,12 +33,18 @@ ENTRY_OF = {MASS: "inertia", VISCOUS: "viscous-friction"}
 """Entries of the catalogue that are a change of one of them."""
 
 
-def bounds_of(stage: Stage, size: int, slack: float = BELIEVED, names: Sequence[str] = ()) -> Bounds:
+def bounds_of(
+    stage: Stage,
+    size: int,
+    slack: float = BELIEVED,
+    names: Sequence[str] = (),
+    freed: frozenset[str] = frozenset(),
+) -> Bounds:
     """Return the bounds of the base's coefficients.
 
-    Mass, viscous and micro-damping stay within `slack` of the belief unless one of the entries `names`
-    releases them; friction elements are
-    springs, not negative, so that the virgin curve rises ever less steeply.
+    Mass, viscous and micro-damping stay within `slack` of the belief, or FREED, unless one of the entries
+    `names` releases them; friction elements are springs, not negative, so that the virgin curve rises ever
+    less steeply.
     """
     m = stage.mechanics
     released = {RELEASED[n] for n in names if n in RELEASED}
@@ -47,7 +54,8 @@ def bounds_of(stage: Stage, size: int, slack: float = BELIEVED, names: Sequence[
         if name in released:
             low[i] = 0.0
         else:
-            low[i], high[i] = value * (1 - slack), value * (1 + slack)
+            far = FREED if name in freed else slack
+            low[i], high[i] = value * (1 - far), value * (1 + far)
     if biased:
         low[-1] = -np.inf
     return Bounds(low, high)
@@ -62,6 +70,15 @@ class Fitted:
     bounds: Bounds
     errors: Floats
     scale: float
+    freed: frozenset[str] = frozenset()
+    """Believed numbers that are further off than they may be."""
+
+    @property
+    def at_bounds(self) -> frozenset[str]:
+        """Believed numbers that went as far as they may."""
+        c, low, high = self.coefficients, self.bounds.low, self.bounds.high
+        near = 1e-6 * np.abs(c)
+        return frozenset(n for i, n in enumerate(NUMBERS) if not low[i] + near[i] < c[i] < high[i] - near[i])
 
     @property
     def coefficients(self) -> Floats:
@@ -86,10 +103,11 @@ def fit_base(
     effects: list[Effect] | None = None,
     scales: tuple[float, ...] = SCALES,
     memory: Memory | None = None,
+    freed: frozenset[str] = frozenset(),
 ) -> Fitted:
     """Refit the believed stage, with `effects` at work, on the grid of reaches that predicts best.
 
-    `memory` is that of another ledger of this stage and motion.
+    `memory` is that of another ledger of this stage and motion; `freed` numbers may be further off.
     """
     memory = memory or Memory()
     given = list(effects or [])
@@ -104,11 +122,11 @@ def fit_base(
         # hangs behind a play first the believed friction, then the one found with it.
         for at_work in [[], given, given] if whole else [given, given] if play else [given]:
             system = ledger.system(at_work)
-            bounds = bounds_of(stage, system.columns.shape[1], names=names)
+            bounds = bounds_of(stage, system.columns.shape[1], names=names, freed=freed)
             found = system.blocks.coefficients(ledger.seen, bounds)
             ledger.weigh(found[FIXED : FIXED + ledger.reaches.size])
             ledger.carried = found[:FIXED] if play and at_work else None
-        return Fitted(ledger, system, bounds, system.blocks.left_out(ledger.seen, bounds), scale)
+        return Fitted(ledger, system, bounds, system.blocks.left_out(ledger.seen, bounds), scale, freed)
 
     return min(shared(at_scale, scales), key=lambda fitted: float(fitted.errors.sum()))
 

@@ -45,7 +45,7 @@ def neighbours(stage: Stage, motion: Motion, refined: Refined) -> list[Refined]:
     fitted = refined.fitted
 
     def beside(factor: float) -> Refined:
-        base = fit_base(stage, motion, effects, (fitted.scale * factor,), fitted.ledger.memory)
+        base = fit_base(stage, motion, effects, (fitted.scale * factor,), fitted.ledger.memory, fitted.freed)
         return refine(base, motion, refined.entries, tries=3)
 
     return shared(beside, BESIDE)

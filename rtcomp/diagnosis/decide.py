@@ -8,18 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-
-import numpy as np
+from functools import cache, partial
 
 from rtcomp.diagnosis.accept import (
     ABOVE_FLOOR,
     DISTINCT,
-    ELSE,
     NEAR,
     SETTLED,
-    is_something_else,
     modelled,
-    settles_the_rest,
     stands_out,
     worth_it,
 )
@@ -27,6 +23,7 @@ from rtcomp.diagnosis.addition import Addition, Progress, best_addition, settle
 from rtcomp.diagnosis.alike import APART, ONE_THING, SHAPELESS, alike, last
 from rtcomp.diagnosis.base import Fitted
 from rtcomp.diagnosis.double import Double
+from rtcomp.diagnosis.further import beside, further_off, jumped, leaves_more, may_have_jumped
 from rtcomp.diagnosis.lengths import left_out
 from rtcomp.diagnosis.look_ahead import SHAPED, look_ahead
 from rtcomp.diagnosis.motion import Motion
@@ -38,9 +35,6 @@ from rtcomp.stage.stage import Stage
 
 MOST = 4
 """Entries named at the most: beyond, a recording does not carry the decision."""
-ONCE = 4.0
-"""Times the floor of its stretch that is left where the sensor may have jumped, from which on it is looked
-into."""
 CHANCE = 0.35
 """Part of what an entry gains that it may gain on the double, where the level of the error shows little."""
 EXCHANGED = 0.93
@@ -122,15 +116,16 @@ def decide(
     ahead: Addition | None = None
     greedy: Refined | None = None
     free_curve: Refined | None = None
+    rivals: list[Refined] = []
     for step in range(MOST):
-        once = _once(motion, current, floor)
+        once = may_have_jumped(motion, current, floor)
         if current.errors.sum() < ABOVE_FLOOR * floor.sum() and (distinct is None or entries) and not once:
             break
         explained = modelled((str(e["name"]) for e in entries), (c.gain for c in choices))
         settled = bool(entries) and not once
         settled &= bool(current.errors.sum() - floor.sum() < SETTLED * explained)
-        double = Double.of(stage, refined, motion, floor) if settled else None
-        if settled and (double is None or current.errors.sum() < ELSE * double.errors.sum()):
+        double_of = cache(partial(Double.of, stage, refined, motion, floor))
+        if settled and not leaves_more(current, double_of()):
             break
         near = step == 0 and bool(current.errors.sum() < NEAR * floor.sum())
         added = ahead or best_addition(stage, motion, current, entries, part_of(step), without)
@@ -145,32 +140,35 @@ def decide(
             else:
                 added, ahead = look_ahead(stage, motion, current, added, floor, part_of(step), without)
         best = added.best
-        together = step == 0 and best is not greedy and not near
+        if entries:
+            exact = sum(c.gain for c in choices) - explained
+            best = beside(motion, current, added, floor, None if settled else (explained, exact), double_of)
+        elif best is not None and (near or best is greedy):
+            counts = jumped(motion, current, best, floor) or worth_it(current.errors, best.errors, floor)
+            shown = stands_out(current.errors, best.errors, distinct or DISTINCT)
+            shapeless = last(best) in SHAPELESS
+            doubtful = (near and shapeless) or not counts
+            if (doubtful and not shown) or (shapeless and not counts):
+                break
+            decision.faint = not counts
         if best is None:
             break
-        shapeless = last(best) in SHAPELESS
-        jumped = once and last(best) == "sensor-jump" and not _once(motion, best.fitted, floor)
-        if not together and not jumped and not worth_it(current.errors, best.errors, floor):
-            if step > 0 or shapeless or not stands_out(current.errors, best.errors, distinct or DISTINCT):
-                break
-            decision.faint = True
-        elif near and shapeless and not stands_out(current.errors, best.errors, distinct or DISTINCT):
-            break
-        exact = sum(c.gain for c in choices) - explained
-        before, after = current.errors, best.errors
-        if entries and (settled or not settles_the_rest(explained, before, after, floor, shapeless, exact)):
-            double = double or Double.of(stage, refined, motion, floor)
-            if shapeless or double is None or not _is_something_else(double, before, best):
-                break
         gained = float(current.errors.sum() - best.errors.sum())
         names, probability = alike(best, added.others, current, floor)
         choices.append(Choice(names, probability, gained))
+        rivals = [best, *(r for r in added.others if last(r) in names)]
         refined = best
         entries, current = refined.entries, refined.fitted
         for choice, entry in zip(choices, entries, strict=True):
             choice.put_first(str(entry["name"]))
+    freed = further_off(stage, motion, rivals, floor) if rivals else None
+    if freed is not None:
+        refined = freed
+        choices[-1].put_first(last(freed))
     if len(choices) > 1 and (promising is None or promising(refined)):
-        refined = _exchange(stage, motion, refined, choices, floor, part_of(MOST - 1), without)
+        refined = _exchange(
+            stage, motion, refined, choices, floor, part_of(MOST - 1), without, as_found=freed is None
+        )
     refined, choices = _prune(stage, motion, refined, choices, floor)
     if free_curve is not None:
         refined, choices = _without_names(base, refined, choices, free_curve)
@@ -181,13 +179,6 @@ def decide(
         choice.probability = choice.probability if len(choice.names) > 1 else 1.0
     decision.refined, decision.choices = refined, choices
     return decision
-
-
-def _once(motion: Motion, current: Fitted, floor: Floats) -> bool:
-    """Tell whether a stretch in which the sensor may have jumped is far off, whatever all are together."""
-    seen = np.flatnonzero(current.ledger.seen)
-    far = current.errors > ONCE * np.maximum(floor, floor.mean())
-    return bool(far[np.isin(seen, list(motion.jumped))].any())
 
 
 def _not_by_chance(added: Addition, current: Fitted, double: Double | None) -> Addition:
@@ -203,11 +194,6 @@ def _not_by_chance(added: Addition, current: Fitted, double: Double | None) -> A
     return replace(added, best=kept[0] if kept else None, others=kept[1:])
 
 
-def _is_something_else(double: Double, before: Floats, best: Refined) -> bool:
-    """Tell whether the last entry of `best` explains what the kernels of those before it do not leave."""
-    return is_something_else(before, best.errors, double.errors, double.gain(best.entries[-1]))
-
-
 def _exchange(
     stage: Stage,
     motion: Motion,
@@ -216,9 +202,12 @@ def _exchange(
     floor: Floats,
     progress: Progress,
     without: frozenset[str],
+    as_found: bool = True,
 ) -> Refined:
-    """Look for each entry again with the others at work: what was named first had to do for them as well."""
-    as_found = True
+    """Look for each entry again with the others at work: what was named first had to do for them as well.
+
+    `as_found` says that the base is still the one that the last of them was found on.
+    """
     for at in range(len(choices)):
         if as_found and at == len(choices) - 1:
             break  # it was found beside these others

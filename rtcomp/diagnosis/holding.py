@@ -18,6 +18,8 @@ FAR, NEARLY_ALL, TOGETHER = 4.0, 0.97, 0.9
 above that than NEARLY_ALL (a lone one) or TOGETHER, are the nearest of the catalogue to something that is not
 in it. Several are held to that only where the floor is a double's: what the method leaves at the least is no
 measure of how far four names may be from a machine."""
+VERY_FAR = 10.0
+"""Times the floor that several leave, from which on they are held to as much as a lone one."""
 
 
 def does_harm(fit: Fit, much: float = 0.0) -> bool:
@@ -54,5 +56,5 @@ def explains_little(fit: Fit, least: float) -> bool:
 
 def leaves_much(fit: Fit, names: int = 1, doubled: bool = True) -> bool:
     """Tell whether far more than noise is left of what was put aside, and more than trimming explains."""
-    least = NEARLY_ALL if names == 1 else TOGETHER
+    least = NEARLY_ALL if names == 1 or fit.after > VERY_FAR * fit.floor else TOGETHER
     return (names == 1 or doubled) and fit.after > FAR * fit.floor and explains_little(fit, least)

@@ -178,10 +178,10 @@ def fitted_with(
 ) -> tuple[Fitted, Floats]:
     """Fit `system` and return it with the residual (N) of the rows that may be seen, scaled alike."""
     size = system.columns.shape[1]
-    bounds = bounds_of(ledger.stage, size, names=names)
+    bounds = bounds_of(ledger.stage, size, names=names, freed=base.freed)
     scale = believed_power(ledger) / max(float(system.blocks.power[ledger.seen].sum()), 1e-300)
     errors = system.blocks.left_out(ledger.seen, bounds) * scale
-    fitted = Fitted(ledger, system, bounds, errors, base.scale)
+    fitted = Fitted(ledger, system, bounds, errors, base.scale, base.freed)
     rows = ledger.seen[ledger.block]
     residual = (system.y - system.columns @ fitted.coefficients)[rows] * np.sqrt(scale)
     return fitted, residual

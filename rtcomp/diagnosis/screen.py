@@ -117,7 +117,7 @@ def _as_believed(scene: Scene, others: list[Entry], power: float) -> list[Screen
     def tried(point: Point) -> Screened | None:
         try:
             effects = [effect_of(e) for e in beside(others, point.entry)]
-            own = fit_base(ledger.stage, scene.motion, effects, (1.0,), ledger.memory)
+            own = fit_base(ledger.stage, scene.motion, effects, (1.0,), ledger.memory, scene.fitted.freed)
         except ConfigError:
             return None
         scale = power / max(float(own.system.blocks.power[ledger.seen].sum()), 1e-300)

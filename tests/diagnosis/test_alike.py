@@ -11,7 +11,7 @@ import pytest
 from recorded import run
 from recorded import stage as axis
 
-from rtcomp.diagnosis.alike import bounded, last, least_far, plainest
+from rtcomp.diagnosis.alike import bounded, last, least_far, plainest, steadily_worse
 from rtcomp.diagnosis.base import fit_base
 from rtcomp.diagnosis.certain import birge, intervals, neighbours
 from rtcomp.diagnosis.departure import USUAL, departure, off
@@ -149,3 +149,21 @@ def test_a_wave_that_does_as_well_comes_before_a_spring_that_pushes_outwards() -
     assert bounded(outwards, [outwards, near], base) is near
     assert bounded(outwards, [outwards, far], base) is outwards
     assert bounded(inwards, [inwards, near], base) is inwards
+
+
+@pytest.mark.parametrize(
+    ("ratio", "scatter", "told"),
+    [
+        (1.4, 0.2, True),  # a little, in every block
+        (1.4, 2.0, False),  # as much in all, by accident of some
+        (1.05, 0.01, False),  # everywhere, but next to nothing
+        (0.7, 0.1, False),
+    ],
+)
+@pytest.mark.parametrize("loud", [1.0, 50.0])
+def test_a_name_is_told_apart_by_a_little_that_every_block_has(
+    ratio: float, scatter: float, told: bool, loud: float
+) -> None:
+    best = np.geomspace(1.0, loud, 20)
+    either = np.where(np.arange(20) % 2, 1.0, -1.0)[np.random.default_rng(3).permutation(20)]
+    assert steadily_worse(best, best * ratio * np.exp(scatter * either)) is told

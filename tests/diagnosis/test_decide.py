@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
-
 import numpy as np
 import pytest
 
 from rtcomp.diagnosis.accept import MAINLY, modelled, settles_the_rest, stands_out, worth_it
-from rtcomp.diagnosis.decide import ONCE, _once
 from rtcomp.diagnosis.look_ahead import most_left
 from rtcomp.kernels import Floats
 
@@ -98,28 +94,6 @@ def test_what_bends_to_anything_gives_way_to_a_name_unless_a_curve_stays_beside_
     bending: bool, second: str, most: float
 ) -> None:
     assert most_left(bending, second, 10.0, 1.0) == pytest.approx(most)
-
-
-@pytest.mark.parametrize(
-    ("off", "jumped", "does"),
-    [
-        (7, {7}, True),
-        (7, {8}, False),  # far off, but where no reading jumped
-        (None, {7}, False),
-        (7, {3}, False),  # put aside: nothing is fitted there
-    ],
-)
-def test_a_stretch_in_which_the_sensor_jumped_is_looked_into_by_itself(
-    off: int | None, jumped: set[int], does: bool
-) -> None:
-    seen = np.arange(BLOCKS) != 3
-    floor = even(1.0)[seen]
-    errors = floor.copy()
-    if off is not None:
-        errors[np.flatnonzero(np.flatnonzero(seen) == off)] *= 2.0 * ONCE
-    fitted: Any = SimpleNamespace(errors=errors, ledger=SimpleNamespace(seen=seen))
-    motion: Any = SimpleNamespace(jumped=jumped)
-    assert _once(motion, fitted, floor) is does
 
 
 def test_two_names_at_the_floor_replace_a_free_curve_that_leaves_nearly_as_much() -> None:

@@ -43,6 +43,7 @@ def test_several_names_may_leave_more_but_not_most_of_it() -> None:
     assert leaves_much(Fit(0.12, 0.117, 0.08, 0.004), names=2)
     assert not leaves_much(Fit(0.12, 0.117, 0.08, 0.004), names=2, doubled=False)
     assert leaves_much(Fit(0.12, 0.117, 0.08, 0.004), names=1, doubled=False)
+    assert leaves_much(Fit(0.45, 0.206, 0.05, 0.0016), names=2)  # 94 %, but 30 floors are left
 
 
 def test_what_happens_once_may_harm_a_little_where_it_does_not_happen() -> None:
