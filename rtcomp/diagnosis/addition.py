@@ -31,8 +31,12 @@ FAR, FURTHER, NOTHING = 3.0, 100.0, 0.01
 first leaves more than this part of what there was: if it is a name, if it is a free curve."""
 NEARLY = 0.93
 """Part of what a shapeless entry explains, from which on a name with a shape of its own is preferred."""
-BESIDE = {"backlash": "resonance", "resonance": "backlash"}
-"""Entries not looked for beside each other: a play has a contact that rings, a second mass goes loose."""
+BESIDE = {
+    "backlash": "resonance", "resonance": "backlash",
+    "asymmetric-viscous-friction": "viscous-friction", "viscous-friction": "asymmetric-viscous-friction",
+}  # fmt: skip
+"""Entries not looked for beside each other: a play has a contact that rings, a second mass goes loose; what
+differs by direction lets the viscous friction go, which then takes up whatever the other one is."""
 
 NOT_IN_PROPORTION = ("drive-deadband", "drive-saturation", "torque-ripple")
 """Entries beside which a force added to the command is not the same as one added to the axis."""

@@ -14,7 +14,7 @@ from rtcomp.diagnosis.decide import Choice, Decision, decide
 from rtcomp.diagnosis.departure import departure
 from rtcomp.diagnosis.extend import extended_stage
 from rtcomp.diagnosis.held_out import HeldOut
-from rtcomp.diagnosis.holding import explains_little, holds, leaves_much, must_explain
+from rtcomp.diagnosis.holding import does_harm, explains_little, holds, leaves_much, must_explain
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Refined, consistent
@@ -101,7 +101,11 @@ def explain(
             # Where the level shows nothing, whatever else is in one block is as large as the name.
             little = typical > CONFIRMED and (little or fit.after > CONFIRMED * fit.retuned)
         once = any(e["name"] == "sensor-jump" for e in named)
-        if not named or (holds(fit, typical, once) and not strays and not little):
+        if named:
+            good = holds(fit, typical, once) and not (strays or little)
+        else:  # what was found only changes believed numbers
+            good = not does_harm(fit, 1.5 * rest)
+        if good:
             return Explanation(decision, named, entries, own, final, fit)
         if little and len(entries) > 1:
             break  # others beside each other would not be nearer

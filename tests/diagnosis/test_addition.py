@@ -74,3 +74,12 @@ def test_a_drift_is_found_beside_a_wave_that_it_moves_along() -> None:
     assert drift["name"] == "sensor-drift"
     assert drift["drift"] == pytest.approx(1.2e-4, rel=0.05)
     assert wave["phase"] == pytest.approx(0.5, abs=0.1)
+
+
+def test_viscous_friction_is_not_looked_for_beside_one_that_differs_by_direction() -> None:
+    """That lets the viscous friction go: the two would grow against each other, and both sides with them."""
+    one_way: Entry = {"name": "asymmetric-viscous-friction", "ratio": 0.01}
+    late: Entry = {"name": "drive-delay", "delay": 3e-3}
+    found = added(one_way, {"name": "viscous-friction", "coefficient": 4.0}, late)
+    assert found.best is not None and found.best.entries[-1]["name"] in ("drive-delay", "sensor-delay")
+    assert not {"viscous-friction", "back-emf"} & {str(r.entries[-1]["name"]) for r in found.others}
