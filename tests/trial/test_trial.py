@@ -132,13 +132,17 @@ def test_a_trial_that_is_stopped_again_while_drawing_loses_nothing(tmp_path: Pat
     command = [*RTCOMP, "trial", "--out", str(out), "--resume", str(kept), "--rivals", "none"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as run:
         until = time.monotonic() + 60.0
-        while not (out / "diagnoses" / f"{answered[0]}.log").exists() and time.monotonic() < until:
+        taken = [
+            out / "diagnoses" / f"{name}.log" for name in answered
+        ]  # fast machines stop with two of them
+        while not all(log.exists() for log in taken) and time.monotonic() < until:
             time.sleep(0.02)
         assert not any((out / "cases").glob("*/train.csv.gz"))
         run.send_signal(signal.SIGTERM)
         run.communicate(timeout=60.0)
     again = out.with_name("again.failed")
-    assert [p.parent.name for p in (again / "diagnoses").glob("*/diagnosis.json")] == answered
+    found = [p.parent.name for p in (again / "diagnoses").glob("*/diagnosis.json")]
+    assert sorted(found) == sorted(answered)
     assert json.loads((again / "stopped.json").read_text())["salts"]
 
 
