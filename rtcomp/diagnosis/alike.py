@@ -14,7 +14,8 @@ from rtcomp.kernels import Floats
 APART = 1.6
 """Factor on the error with the best name, beyond which another name is told apart from it."""
 STEADILY, CLEARLY = 1.15, 4.0
-"""That factor where nearly every block has it: standard errors of its logarithm."""
+"""That factor where every block has its part of it, and the standard errors by which its mean logarithm over
+the blocks is above none then."""
 LATE = ("drive-delay", "drive-lag", "sensor-delay")
 """Entries that differ by how rows sample them: which does better need not be right."""
 FURTHER = 3.0

@@ -71,14 +71,13 @@ class Fitted:
     errors: Floats
     scale: float
     freed: frozenset[str] = frozenset()
-    """Believed numbers that are further off than they may be."""
+    """Believed numbers that may be further off than beliefs usually are: the recording has shown it."""
 
     @property
     def at_bounds(self) -> frozenset[str]:
-        """Believed numbers that went as far as they may."""
-        c, low, high = self.coefficients, self.bounds.low, self.bounds.high
-        near = 1e-6 * np.abs(c)
-        return frozenset(n for i, n in enumerate(NUMBERS) if not low[i] + near[i] < c[i] < high[i] - near[i])
+        """Believed numbers that went as far as they may; what is believed to be nothing may go nowhere."""
+        held = ~self.bounds.within(self.coefficients) & (self.bounds.high > self.bounds.low)
+        return frozenset(name for name, at in zip(NUMBERS, held[:FIXED], strict=True) if at)
 
     @property
     def coefficients(self) -> Floats:

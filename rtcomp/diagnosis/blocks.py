@@ -91,6 +91,11 @@ class Bounds:
     low: Floats
     high: Floats
 
+    def within(self, coefficients: Floats) -> np.ndarray:
+        """Tell of each of the coefficients (p,) whether it is not at a bound, (p,) bool."""
+        slack = 1e-6 * np.abs(coefficients)
+        return np.asarray((coefficients > self.low + slack) & (coefficients < self.high - slack))
+
     def with_free(self, count: int) -> Bounds:
         """Return the bounds with `count` more columns that may be anything."""
         free = np.full(count, np.inf)

@@ -73,10 +73,9 @@ def covariance(refined: Refined) -> Floats:
     bent to itself would promise too much: a score of columns takes a good part of twenty blocks up.
     """
     fitted, j = refined.fitted, refined.jacobian
-    ledger, c, bounds = fitted.ledger, fitted.coefficients, fitted.bounds
+    ledger = fitted.ledger
     rows = ledger.seen[ledger.block]
-    slack = 1e-6 * np.abs(c)
-    free = (c > bounds.low + slack) & (c < bounds.high - slack)
+    free = fitted.bounds.within(fitted.coefficients)
     # What is one number together is told by the knob: beside it the base's part of it says nothing.
     named = {str(e["name"]) for e in refined.entries}
     free[:FIXED] &= [ENTRY_OF.get(number) not in named for number in NUMBERS]

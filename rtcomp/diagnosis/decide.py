@@ -23,7 +23,7 @@ from rtcomp.diagnosis.addition import Addition, Progress, best_addition, settle
 from rtcomp.diagnosis.alike import APART, ONE_THING, SHAPELESS, alike, last
 from rtcomp.diagnosis.base import Fitted
 from rtcomp.diagnosis.double import Double
-from rtcomp.diagnosis.further import beside, further_off, jumped, leaves_more, may_have_jumped
+from rtcomp.diagnosis.further import further_entry, further_off, jumped, leaves_more, may_have_jumped
 from rtcomp.diagnosis.lengths import left_out
 from rtcomp.diagnosis.look_ahead import SHAPED, look_ahead
 from rtcomp.diagnosis.motion import Motion
@@ -142,7 +142,9 @@ def decide(
         best = added.best
         if entries:
             exact = sum(c.gain for c in choices) - explained
-            best = beside(motion, current, added, floor, None if settled else (explained, exact), double_of)
+            best = further_entry(
+                motion, current, added, floor, None if settled else (explained, exact), double_of
+            )
         elif best is not None and (near or best is greedy):
             counts = jumped(motion, current, best, floor) or worth_it(current.errors, best.errors, floor)
             shown = stands_out(current.errors, best.errors, distinct or DISTINCT)

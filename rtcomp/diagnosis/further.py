@@ -25,7 +25,7 @@ AS_MUCH = 0.75
 in its place."""
 
 
-def beside(
+def further_entry(
     motion: Motion,
     current: Fitted,
     added: Addition,

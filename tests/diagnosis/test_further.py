@@ -14,7 +14,7 @@ from test_alike import reference
 from rtcomp.diagnosis.accept import is_the_rest
 from rtcomp.diagnosis.addition import Addition
 from rtcomp.diagnosis.base import BELIEVED, fit_base
-from rtcomp.diagnosis.further import ONCE, beside, further_off, jumped, may_have_jumped
+from rtcomp.diagnosis.further import ONCE, further_entry, further_off, jumped, may_have_jumped
 from rtcomp.diagnosis.motion import prepare
 from rtcomp.diagnosis.refine import refine
 from rtcomp.kernels import Floats
@@ -93,7 +93,7 @@ def test_where_a_free_curve_does_not_count_the_name_that_does_nearly_as_much_may
         [],
         {},
     )
-    found = beside(NOTHING, first.fitted, added, floor, (285.0, 0.0), lambda: None)
+    found = further_entry(NOTHING, first.fitted, added, floor, (285.0, 0.0), lambda: None)
     assert (found and found.entries[-1]["name"]) == counts
 
 
@@ -101,7 +101,7 @@ def test_a_free_curve_that_counts_needs_no_name() -> None:
     curve = left(even(20.0), "creep", "position-force")
     added = Addition(curve, [left(even(25.0), "creep", "cogging")], [], {})
     assert (
-        beside(NOTHING, left(even(100.0), "creep").fitted, added, even(1.0), (50.0, 0.0), lambda: None)
+        further_entry(NOTHING, left(even(100.0), "creep").fitted, added, even(1.0), (50.0, 0.0), lambda: None)
         is curve
     )
 
@@ -127,6 +127,8 @@ def test_a_mass_that_is_further_off_is_let_go_beside_a_delay(mass: float) -> Non
     base = fit_base(believed, motion)
     held = refine(base, motion, [late])
     assert ("mass" in held.fitted.at_bounds) is (mass > 2.0)
+    nothing = fit_base(axis(viscous=0.0), motion)
+    assert "viscous" not in nothing.at_bounds  # believed to be nothing: it may go nowhere
     found = further_off(believed, motion, [held], np.full(held.errors.size, held.errors.min()))
     if mass == 2.0:
         assert found is None
