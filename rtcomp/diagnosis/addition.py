@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtcomp.diagnosis.alike import ONE_THING, SHAPELESS, bounded, last, least_far, plainest
+from rtcomp.diagnosis.alike import ONE_THING, PLAINER, SHAPELESS, bounded, last, least_far, plainest
 from rtcomp.diagnosis.base import FIXED, SCALES, Fitted, fit_base
 from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.cores import shared
@@ -175,8 +175,11 @@ def _settle_contenders(
     A base that has bent to an effect is no fair ground for its name. `also` has other forms by name.
     """
     whole, first = float(current.errors.sum()), float(tried[0].errors.sum())
-    left = [float(r.errors.sum()) for r in tried[:CONTENDERS]]
-    contend = [at for at, errors in enumerate(left) if whole - errors > 0.5 * (whole - first)]
+    left = [float(r.errors.sum()) for r in tried]
+    hopeful = [at for at, errors in enumerate(left) if whole - errors > 0.5 * (whole - first)]
+    plainer = {PLAINER.get(last(tried[at])) for at in hopeful[:CONTENDERS]}
+    # One number's other value is no less a name than what has that and more, once both are settled.
+    contend = [at for at in hopeful if at < CONTENDERS or last(tried[at]) in plainer]
     near = [at for at in contend if left[at] < FAR * first]
     shapeless = last(tried[0]) in SHAPELESS
     for far in False, True:

@@ -33,6 +33,8 @@ BESIDE = (0.85, 1.18)
 """Factors on the reaches of the grids that a fit is held against."""
 MOVED = 0.02
 """Relative change of a parameter that is worth reporting."""
+AT_BOUND = 0.002
+"""Part of the furthest that is believed, within which a number is held there."""
 SEVERAL = 3
 """Numbers that must have moved for it to be said that all did."""
 FREEDOM, WIDE = 9, 2.262
@@ -192,7 +194,7 @@ class Numbers:
         # What is held at its bound is so by the belief, not by the recording: its interval reaches back.
         held = np.zeros(values.size)
         for i in range(FIXED):
-            if before[i] > 0 and abs(abs(values[i] / before[i] - 1.0) / BELIEVED - 1.0) < 0.05:
+            if before[i] > 0 and abs(abs(values[i] / before[i] - 1.0) / BELIEVED - 1.0) < AT_BOUND:
                 held[i] = BELIEVED * before[i]
         return cls(before, values, half, held)
 

@@ -49,6 +49,31 @@ class System:
     blocks: Blocks
 
 
+@dataclass(frozen=True)
+class Play:
+    """A play at work, and how much heavier than the refitted base all is that moves, where that is named."""
+
+    effect: Effect
+    heavier: float
+
+    @classmethod
+    def of(cls, effects: Sequence[Effect], mass: float) -> Play | None:
+        """Return the play among `effects` (not what is believed of the base, `mass`), None where none is."""
+        play = next((e for e in effects if e.name == "backlash" and e.values["gap"] > 0.0), None)
+        named = next((e.values["mass"] for e in effects if e.name == "inertia"), mass)
+        return None if play is None else cls(play, named / mass)
+
+    @property
+    def share(self) -> float:
+        """Mass behind the play over that of the refitted base."""
+        return self.effect.values["share"] * self.heavier
+
+    @property
+    def key(self) -> Hashable:
+        """What it is remembered by."""
+        return (_key([self.effect]), self.heavier)
+
+
 @dataclass
 class Ledger:
     """Builds systems for one stage and motion; remembers what does not change."""
@@ -123,7 +148,7 @@ class Ledger:
         modifiers += [companion for e in modifiers for companion in e.companions()]
         sensors = [e for e in effects if e.place is Place.SENSOR]
         others = [e for e in effects if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
-        play = next((e for e in others if e.name == "backlash" and e.values["gap"] > 0.0), None)
+        play = Play.of(others, self.stage.mass)
         hung = sorted((e for e in others if e.name in HUNG), key=lambda e: e.order)
         if not any(e.name == "resonance" for e in hung):
             hung = []
@@ -147,7 +172,7 @@ class Ledger:
                 moved = (a * f.mass - around_rows(f.push)) / self.stage.mass
             if play is not None:
                 rest = derivatives(self._behind(sensors, play)[i], self.motion.period)[1]
-                moved = moved + play.values["share"] * (rest - a)
+                moved = moved + play.share * (rest - a)
             sides.append(side)
             masses.append(moved)
         columns = [self.motion.smooth(masses), self._friction(before, modifiers, sensors, play)]
@@ -166,12 +191,12 @@ class Ledger:
             _key(sensors), lambda: [kinematics(strip, self.motion, sensors) for strip in self.motion.strips]
         )
 
-    def _behind(self, sensors: Sequence[Effect], play: Effect) -> list[Floats]:
+    def _behind(self, sensors: Sequence[Effect], play: Play) -> list[Floats]:
         """Return the position (m) of the load behind a play along each strip."""
         found = () if self.carried is None else (self.carried.tobytes(),)
         own = self._believes_load() is None and (self.weights.tobytes(), self.reaches.tobytes(), *found)
         return self.memory.loads.of(
-            (_key(sensors), _key([play]), own),
+            (_key(sensors), play.key, own),
             lambda: [self._drawn(x, play) for x, _, _ in self._kinematics(sensors)],
         )
 
@@ -186,20 +211,21 @@ class Ledger:
         stiffnesses, reaches = zip(*friction.elements, strict=True)
         return np.array(stiffnesses), np.array(reaches)
 
-    def _drawn(self, x: Floats, play: Effect) -> Floats:
+    def _drawn(self, x: Floats, play: Play) -> Floats:
         m = self.stage.mechanics
         weights, reaches = self._believes_load() or (self.weights, self.reaches)
         numbers = (m.mass, m.viscous, m.micro_damping) if self.carried is None else self.carried
         mass, viscous, micro = map(float, numbers)
-        load = Load(play.values["share"] * mass, viscous, micro, m.micro_damping_speed, weights, reaches)
-        return behind_play(x, self.motion.period, play.values["gap"], play.values["contact"], load)
+        load = Load(play.share * mass, viscous, micro, m.micro_damping_speed, weights, reaches)
+        values = play.effect.values
+        return behind_play(x, self.motion.period, values["gap"], values["contact"], load)
 
     def _friction(
         self,
         before: Sequence[Effect],
         modifiers: Sequence[Effect],
         sensors: Sequence[Effect],
-        play: Effect | None,
+        play: Play | None,
     ) -> Floats:
         """Return the units of friction on the kept rows."""
 
@@ -220,7 +246,7 @@ class Ledger:
             return self.motion.smooth(rows)
 
         weighs = play is not None or any(e.name in WHOLE for e in modifiers)
-        behind = play is not None and (_key([play]), self.carried is not None and self.carried.tobytes())
+        behind = play is not None and (play.key, self.carried is not None and self.carried.tobytes())
         own = self.reaches.tobytes(), weighs and self.weights.tobytes()
         return self.memory.frictions.of((_key(before), _key(modifiers), _key(sensors), behind, own), found)
 

@@ -16,8 +16,10 @@ from rtcomp.diagnosis.base import fit_base
 from rtcomp.diagnosis.extend import extended_stage
 from rtcomp.diagnosis.motion import prepare
 from rtcomp.diagnosis.refine import evaluate
+from rtcomp.diagnosis.scene import Entry
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.balance import force_balance
+from rtcomp.stage.stage import Stage
 
 NUMBERS = {"inertia", "viscous-friction", "micro-damping"}
 """Entries that are a number of the stage: they are not given beside it."""
@@ -38,19 +40,38 @@ BELIEVED = PLAIN.with_changes(
 )
 
 
+
+
+def left_apart(true: Stage, found: list[Entry], heavier: float = 1.0) -> float:
+    """Return the part of the force by which fit and stage made of it differ, on a recording of `true`.
+
+    `heavier` says how much more than the believed mass is named.
+    """
+    time, position, voltage = recorded(true)
+    motion = prepare(BELIEVED, [Recording({"time": time, "position": position, "voltage": voltage}, 1000.0)])
+    named: list[Entry] = [{"name": "inertia", "mass": heavier * BELIEVED.mass}] if heavier != 1.0 else []
+    fitted, _ = evaluate(fit_base(BELIEVED, motion), [*named, *found])
+    mass = heavier * float(fitted.coefficients[0])
+    assert mass == pytest.approx(true.mass, rel=0.04)
+    extended = extended_stage(BELIEVED, fitted, found).with_changes(stage={"mass": mass})
+    (strip,) = motion.strips
+    balance = force_balance(extended, strip.time, strip.position, strip.voltage, motion.cut)
+    left = (balance.force_drive - balance.force_motion)[motion.kept(strip)]
+    return float(np.sqrt(np.mean((left - fitted.residual) ** 2) / np.mean(balance.force_motion**2)))
+
+
 @every
 def test_the_extended_stage_leaves_what_the_fit_left(entry: type[physics.Effect]) -> None:
     if entry.name in MODELS | NUMBERS | UNSEEN.keys():
         pytest.skip("a diagnosis gives no such entry beside the stage's own numbers")
-    time, position, voltage = recorded(stage_with(entry))
-    columns = {"time": time, "position": position, "voltage": voltage}
-    motion = prepare(BELIEVED, [Recording(columns, 1000.0)])
-    found = [{"name": entry.name, **entry.example}]
-    fitted, _ = evaluate(fit_base(BELIEVED, motion), found)
-    assert fitted.coefficients[0] == pytest.approx(2.0, rel=0.04)  # a mass that was believed 8 % lighter
-    extended = extended_stage(BELIEVED, fitted, found)
-    (strip,) = motion.strips
-    balance = force_balance(extended, strip.time, strip.position, strip.voltage, motion.cut)
-    left = (balance.force_drive - balance.force_motion)[motion.kept(strip)]
-    part = np.sqrt(np.mean((left - fitted.residual) ** 2) / np.mean(balance.force_motion**2))
-    assert part < NEARLY.get(entry.name, 1e-5)
+    # A mass that was believed 8 % lighter.
+    apart = left_apart(stage_with(entry), [{"name": entry.name, **entry.example}])
+    assert apart < NEARLY.get(entry.name, 1e-5)
+
+
+@pytest.mark.parametrize("name", ["backlash", "resonance"])
+def test_what_hangs_on_the_mass_is_part_of_the_one_that_is_named(name: str) -> None:
+    entry = physics.entry(name)
+    true = stage_with(entry).with_changes(stage={"mass": 2.4})
+    apart = left_apart(true, [{"name": name, **entry.example}], heavier=2.4 / BELIEVED.mass)
+    assert apart < NEARLY.get(name, 1e-5)

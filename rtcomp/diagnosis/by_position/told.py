@@ -28,6 +28,9 @@ MODEL = 0.005
 """Relative half width of an interval that no amount of data removes."""
 LEFT = 0.2
 """Part of the error above the floor that names may leave without it being said."""
+HARM, HELP, SMALL = 1.02, 0.95, 1.5
+"""Factors on the error of windows not seen: on that of the believed and the retuned stage, beyond which names
+are taken back; on the retuned stage's, which they must be below, unless below that many times the noise's."""
 LONGEST = 0.5
 """Longest period of a wave along the stroke, in strokes: what was not seen twice is not known to recur."""
 UNITS = {
@@ -63,7 +66,7 @@ def told_by_position(
     say(0.2, "judge")
     extended, retuned_stage = decided.best.setting.stage(), decided.base.setting.stage()
     errors = _position(stage, retuned_stage, extended, windows, motion.cut, seed)
-    if decided.steps and errors.after > 1.02 * min(errors.before, errors.retuned):
+    if decided.steps and not _holds(errors):
         # What is gained on the windows seen must hold on the others; else it is no explanation.
         decided.best, decided.steps = decided.base, []
         halves = _halves(decided, believed, windows)
@@ -140,6 +143,12 @@ def _position(
     off = [float(np.mean(np.abs(windows.off(s, unseen)))) for s in (stage, retuned, extended)]
     floor = float(np.mean(np.abs(clean.off(extended, unseen))))
     return PositionFit(off[0], off[1], off[2], floor, windows.seconds)
+
+
+def _holds(errors: PositionFit) -> bool:
+    """Tell whether names end closer on windows that were not seen, by more than chance would."""
+    helps = errors.after < max(HELP * errors.retuned, SMALL * errors.floor)
+    return helps and errors.after <= HARM * min(errors.before, errors.retuned)
 
 
 def _verdict(decided: Verdicts, effects: Sequence[Named], errors: PositionFit) -> Verdict:
