@@ -40,8 +40,6 @@ BELIEVED = PLAIN.with_changes(
 )
 
 
-
-
 def left_apart(true: Stage, found: list[Entry], heavier: float = 1.0) -> float:
     """Return the part of the force by which fit and stage made of it differ, on a recording of `true`.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from recorded import STAGE, run
 from test_alike import reference
 
+from rtcomp.diagnosis import addition
 from rtcomp.diagnosis.addition import Addition, _biases, best_addition
 from rtcomp.diagnosis.base import fit_base
 from rtcomp.diagnosis.candidates import effect_of
@@ -74,6 +76,24 @@ def test_a_drift_is_found_beside_a_wave_that_it_moves_along() -> None:
     assert drift["name"] == "sensor-drift"
     assert drift["drift"] == pytest.approx(1.2e-4, rel=0.05)
     assert wave["phase"] == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_plainer_name_is_settled_as_what_is_it_and_more_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else what frees the number comes before the number, as only that is refined together with others."""
+    settled: list[str] = []
+
+    def settling(_stage: Any, _motion: Any, refined: Any) -> Any:
+        settled.append(refined.entries[-1]["name"])
+        return refined
+
+    monkeypatch.setattr(addition, "_well_settled", settling)
+    monkeypatch.setattr(addition, "shared", lambda call, items: list(map(call, items)))
+    left = {"drive-gain": 3.2, "asymmetric-viscous-friction": 3.3, "sensor-scale": 3.4, "quadratic-drag": 3.5}
+    left |= {"viscous-friction": 5.4, "inertia": 5.5}
+    tried: list[Any] = [SimpleNamespace(entries=[{"name": n}], errors=np.array([e])) for n, e in left.items()]
+    current: Any = SimpleNamespace(errors=np.array([67.0]))
+    addition._settle_contenders(current, current, current, tried, {})
+    assert settled == [*list(left)[:3], "viscous-friction"]
 
 
 def test_viscous_friction_is_not_looked_for_beside_one_that_differs_by_direction() -> None:

@@ -11,11 +11,12 @@ import pytest
 
 from rtcomp.diagnosis.by_position.decide import Judge, Judged, Step, Verdicts, drop, worth_it
 from rtcomp.diagnosis.by_position.sticking import MUCH, hidden, mostly_hidden
-from rtcomp.diagnosis.by_position.told import unsure
+from rtcomp.diagnosis.by_position.told import holds, unsure
 from rtcomp.diagnosis.by_position.turning import Setting, fit
 from rtcomp.diagnosis.by_position.windows import windows_of
 from rtcomp.diagnosis.diagnose import diagnose
 from rtcomp.diagnosis.motion import BLOCKS
+from rtcomp.diagnosis.result import PositionFit
 from rtcomp.jobs.demo import shipped
 from rtcomp.recording.driven import driven
 from rtcomp.recording.reader import Recording, read
@@ -155,6 +156,24 @@ def test_an_entry_whose_size_is_not_told_from_none_goes(
     )
     judged = Judged(Setting(stage(), {}, entries), 1.0, np.ones(BLOCKS))
     assert unsure(Verdicts(judged, judged), halves) == at
+
+
+@pytest.mark.parametrize(
+    ("after", "good"),
+    [
+        (1.2, True),
+        (2.33, False),  # a hundredth closer than retuned, far from what noise leaves: chance
+        (2.37, False),
+        (0.14, True),  # as near as noise leaves it
+    ],
+)
+def test_names_must_end_closer_on_windows_that_were_not_seen(after: float, good: bool) -> None:
+    assert holds(PositionFit(5.3e-6, 2.36e-6, after * 1e-6, 0.1e-6, 0.04)) is good
+
+
+def test_near_the_noise_names_need_only_do_no_harm() -> None:
+    assert holds(PositionFit(0.14e-6, 0.12e-6, 0.119e-6, 0.1e-6, 0.04))
+    assert not holds(PositionFit(0.14e-6, 0.12e-6, 0.125e-6, 0.1e-6, 0.04))
 
 
 def test_the_last_entry_that_goes_leaves_the_refitted_belief(loaded: list[Recording]) -> None:

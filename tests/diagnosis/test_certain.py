@@ -123,6 +123,18 @@ def test_forces_that_all_moved_by_one_factor_are_another_force_constant(
     assert one.after.low < one.after.value < one.after.high
 
 
+@pytest.mark.parametrize(("mass", "held"), [(0.892, False), (0.80, True)])
+def test_a_number_just_within_what_may_be_believed_is_told_by_the_recording(mass: float, held: bool) -> None:
+    believed = axis()
+    true = axis(mass=mass * believed.mass)
+    motion = prepare(believed, [run(true, there_and_back(8.0))])
+    refined = refine(fit_base(believed, motion), motion, [])
+    found = Numbers.of(believed, refined, [], extended_stage(believed, refined.fitted, []))
+    assert bool(found.held[0]) is held
+    told = {r.parameter: r.after for r in retunings(found, "linear")}
+    assert held or told["mass"].low <= true.mass <= told["mass"].high
+
+
 def test_a_number_that_is_not_believed_says_nothing_of_the_others() -> None:
     some = numbers(1.1, 0.0, 0.0, 1.1)
     zero = np.array([1.0, 0.0, 0.0, 1.0, 1.0])

@@ -66,7 +66,7 @@ def told_by_position(
     say(0.2, "judge")
     extended, retuned_stage = decided.best.setting.stage(), decided.base.setting.stage()
     errors = _position(stage, retuned_stage, extended, windows, motion.cut, seed)
-    if decided.steps and not _holds(errors):
+    if decided.steps and not holds(errors):
         # What is gained on the windows seen must hold on the others; else it is no explanation.
         decided.best, decided.steps = decided.base, []
         halves = _halves(decided, believed, windows)
@@ -145,7 +145,7 @@ def _position(
     return PositionFit(off[0], off[1], off[2], floor, windows.seconds)
 
 
-def _holds(errors: PositionFit) -> bool:
+def holds(errors: PositionFit) -> bool:
     """Tell whether names end closer on windows that were not seen, by more than chance would."""
     helps = errors.after < max(HELP * errors.retuned, SMALL * errors.floor)
     return helps and errors.after <= HARM * min(errors.before, errors.retuned)
