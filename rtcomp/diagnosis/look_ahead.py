@@ -23,6 +23,10 @@ RIVALS, HOPELESS = 2, 100.0
 """Others tried so at the most, and times the error with the first that they may leave alone."""
 DONE = 3.0
 """Times the floor that two leave, below which no other two are tried."""
+MOST, FAR, SMALLER, MORE = 0.8, 100.0, 0.35, 3
+"""Part of the error that the first must explain, and times the floor that it and its second must leave, for
+something large to be hidden behind it: then the gain of a rival may be this part of the first one's, and so
+many are tried."""
 
 
 def look_ahead(
@@ -47,15 +51,17 @@ def look_ahead(
     gain = float(base.errors.sum() - best.errors.sum())
     group = next((set(g) for g in ONE_THING if last(best) in g), {last(best)})
     shapeless = last(best) in SHAPELESS
-    most = (1.0 - (HALF if shapeless else RIVAL)) * gain + float(best.errors.sum())
-    if not shapeless:
-        most = min(most, HOPELESS * float(best.errors.sum()))
-    rivals = [
-        r
-        for r in first.others
-        if last(r) not in group and last(r) not in SHAPELESS and float(r.errors.sum()) < most
-    ]
-    if not rivals or not worth_it(base.errors, best.errors, floor):
+    hopeless = HOPELESS * float(best.errors.sum())
+    named = [r for r in first.others if last(r) not in group and last(r) not in SHAPELESS]
+
+    def gaining(part: float) -> list[Refined]:
+        most = (1.0 - part) * gain + float(best.errors.sum())
+        return [r for r in named if float(r.errors.sum()) < (most if shapeless else min(most, hopeless))]
+
+    rivals = gaining(HALF if shapeless else RIVAL)[:RIVALS]
+    hidden = gaining(SMALLER)[:MORE] if not shapeless and gain > MOST * float(base.errors.sum()) else []
+    hidden = hidden[len(rivals) :]
+    if not (rivals or hidden) or not worth_it(base.errors, best.errors, floor):
         return first, None
 
     def beside(one: Refined) -> Addition:
@@ -67,9 +73,11 @@ def look_ahead(
     if not asked and not shapeless:
         ahead, asked = beside(best), True
         left = float((ahead.best or best).errors.sum())
-    for rival in rivals[:RIVALS]:
+    for at, rival in enumerate((*rivals, *hidden)):
         bending = last(chosen) in SHAPELESS or _twice(chosen, ahead)
         if asked and left < done and not bending:
+            break
+        if at >= len(rivals) and left < FAR * float(floor.sum()):
             break
         other = beside(rival)
         both = other.best

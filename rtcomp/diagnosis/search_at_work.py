@@ -11,6 +11,7 @@ import numpy as np
 
 from rtcomp.diagnosis.periodogram import periodogram
 from rtcomp.diagnosis.scene import Entry, Point, Scene
+from rtcomp.kernels import Floats
 
 FOLLOWED = {"following": 1.0, "stiffening": 0.5}
 """Entries that what sticks follows: how much stiffer it becomes begins far from both ends, to be refined."""
@@ -18,6 +19,10 @@ RING_S = 2.0
 """s of a stretch that a ringing is looked for in."""
 SLOW = 0.5
 """Part of the bandwidth up to which a wave of the reading is taken to be seen as it is."""
+LEAST_WAVES, MOST_WAVES = 3.0, 400.0
+"""Waves along the stroke, from and to which an error of the reading is looked for."""
+SAME = 0.03
+"""Relative distance of periods that are one."""
 
 
 def at_work(scene: Scene) -> Iterator[Point]:
@@ -158,19 +163,37 @@ def _sensing(s: Scene) -> list[Point]:
 
 
 def _cyclic_periods(s: Scene, peaks: int = 2) -> list[float]:
-    """Return periods (m) whose apparent acceleration stands out of the residual."""
-    mass = s.fitted.ledger.stage.mass
+    """Return periods (m) whose apparent acceleration stands out of the residual.
+
+    Of all rows, and for each octave of periods of those slow enough that the wave is within the comparison's
+    bandwidth: where half of a motion is too fast for a period, the other half still shows it.
+    """
+    weight = s.fitted.ledger.stage.mass * s.v**2
+    speed = np.abs(s.v)
     step = float(np.quantile(np.abs(np.diff(s.x)), 0.5)) or s.span / 1000
-    most = min(400.0, s.span / (3 * step))
-    if most <= 3.0:
-        return []
-    n, power = periodogram(s.x, s.span, mass * s.v**2, s.residual, most)
-    power[n < 3.0] = 0.0
-    found = []
+    found: list[float] = []
+    most = min(MOST_WAVES, s.span / (3 * step))
+    if most > LEAST_WAVES:
+        n, power = periodogram(s.x, s.span, weight, s.residual, most)
+        found += _highest(s.span / n, np.where(n < LEAST_WAVES, 0.0, power), peaks)
+    waves, powers = [], []
+    for low in LEAST_WAVES * 2.0 ** np.arange(np.log2(MOST_WAVES / LEAST_WAVES)):
+        slow = speed < s.motion.cut * s.span / (np.sqrt(2.0) * low)
+        n, power = periodogram(s.x, s.span, np.where(slow, weight, 0.0), s.residual, 2.0 * low)
+        waves.append(n[n >= low])
+        powers.append(power[n >= low])
+    others = _highest(s.span / np.concatenate(waves), np.concatenate(powers), peaks)
+    return found + [p for p in others if all(abs(np.log(p / q)) > SAME for q in found)]
+
+
+def _highest(periods: Floats, power: Floats, peaks: int) -> list[float]:
+    """Return the periods of the highest `power`, none beside another."""
+    left, found = power.copy(), []
     for _ in range(peaks):
-        at = int(np.argmax(power))
-        found.append(s.span / float(n[at]))
-        power[max(at - 3, 0) : at + 4] = 0.0
+        at = int(np.argmax(left))
+        found.append(float(periods[at]))
+        left[max(at - 3, 0) : at + 4] = 0.0
+        left[np.abs(np.log(periods / found[-1])) < SAME] = 0.0
     return found
 
 

@@ -56,3 +56,43 @@ def test_two_waves_give_way_to_two_names_that_do_as_well(
     )
     assert added.best is not None and added.best.entries[-1]["name"] == chosen
     assert ahead is not None and ahead.best is beside[chosen]
+
+
+@pytest.mark.parametrize(
+    ("first", "left", "chosen"),
+    [
+        (
+            169.0,
+            108.0,
+            "viscous-friction",
+        ),  # most is explained, and what is left is a thousand times the floor
+        (169.0, 5.0, "drive-saturation"),  # nearly all is
+        (400.0, 108.0, "drive-saturation"),  # the first is no more than the nearest
+    ],
+)
+def test_what_is_far_behind_is_tried_where_something_large_is_left(
+    monkeypatch: pytest.MonkeyPatch, first: float, left: float, chosen: str
+) -> None:
+    """A limit of the drive and three times the damping: the limit that does for both leaves a ninth."""
+    limit, damping = found(first, "drive-saturation"), found(922.0, "viscous-friction")
+    beside = {
+        "drive-saturation": found(left, "drive-saturation", "frictional-lag"),
+        "viscous-friction": found(0.11, "viscous-friction", "drive-saturation"),
+    }
+
+    def best_addition(stage: Any, motion: Any, current: Any, entries: Any, *rest: Any) -> Addition:
+        return Addition(beside[entries[0]["name"]], [], [], {})
+
+    monkeypatch.setattr(looking, "best_addition", best_addition)
+    base: Any = SimpleNamespace(errors=even(1494.0))
+    anything: Any = None
+    added, _ = looking.look_ahead(
+        anything,
+        anything,
+        base,
+        Addition(limit, [damping], [], {}),
+        even(0.1),
+        lambda part, what: None,
+        frozenset(),
+    )
+    assert added.best is not None and added.best.entries[-1]["name"] == chosen

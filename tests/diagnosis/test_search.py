@@ -13,7 +13,7 @@ from rtcomp.diagnosis.motion import prepare
 from rtcomp.diagnosis.refine import Refined, refine
 from rtcomp.diagnosis.scene import Scene
 from rtcomp.diagnosis.screen import BENT, screen
-from rtcomp.diagnosis.search_at_work import _ringing
+from rtcomp.diagnosis.search_at_work import _cyclic_periods, _ringing
 
 
 def scene(*effects: dict[str, object]) -> Scene:
@@ -25,6 +25,15 @@ def scene(*effects: dict[str, object]) -> Scene:
 def test_a_small_second_mass_is_looked_for_where_it_rings() -> None:
     found = _ringing(scene({"name": "resonance", "frequency": 17.0, "damping": 0.03, "mass_ratio": 0.03}))
     assert found[0] == pytest.approx(17.0, rel=0.06)
+
+
+@pytest.mark.parametrize("period", [2e-5, 8e-6, 5e-6, 3e-6])
+def test_an_error_of_the_reading_is_looked_for_where_the_motion_is_slow_enough(period: float) -> None:
+    """At full speed the shorter of these waves are beyond the bandwidth, or between two rows."""
+    at = scene({"name": "sensor-periodic-error", "amplitude": 1e-7, "period": period, "phase": 0.3})
+    found = _cyclic_periods(at)
+    assert len(found) <= 4
+    assert min(abs(p / period - 1.0) for p in found) < 0.005
 
 
 def test_a_first_look_keeps_every_form() -> None:
