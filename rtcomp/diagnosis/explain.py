@@ -12,7 +12,9 @@ from rtcomp.diagnosis.alike import SHAPELESS
 from rtcomp.diagnosis.base import Fitted
 from rtcomp.diagnosis.decide import Choice, Decision, decide
 from rtcomp.diagnosis.departure import departure
+from rtcomp.diagnosis.double import Double
 from rtcomp.diagnosis.extend import extended_stage
+from rtcomp.diagnosis.further import leaves_more
 from rtcomp.diagnosis.held_out import HeldOut
 from rtcomp.diagnosis.holding import does_harm, explains_little, holds, leaves_much, must_explain
 from rtcomp.diagnosis.locate import locate
@@ -96,7 +98,11 @@ def explain(
         shaped = any(str(e["name"]) not in SHAPELESS for e in entries)
         part = must_explain(decision.left(floor), doubled)
         strays = shaped and departure(final) > 1.5 * departure(base) + STRAYED
-        little = shaped and (explains_little(fit, part) or leaves_much(fit, len(named), doubled))
+        little = shaped and explains_little(fit, part)
+        if shaped and not little and leaves_much(fit, len(named), doubled):
+            # What kernels of several leave of each other, their double leaves too: no sign of anything else.
+            double = Double.of(stage, decision.refined, motion, floor) if len(named) > 1 else None
+            little = double is None or leaves_more(final, double)
         if faint or decision.faint:
             # Where the level shows nothing, whatever else is in one block is as large as the name.
             little = typical > CONFIRMED and (little or fit.after > CONFIRMED * fit.retuned)
