@@ -73,7 +73,7 @@ def test_two_waves_give_way_to_two_names_that_do_as_well(
 def test_what_is_far_behind_is_tried_where_something_large_is_left(
     monkeypatch: pytest.MonkeyPatch, first: float, left: float, chosen: str
 ) -> None:
-    """A limit of the drive and three times the damping: the limit that does for both leaves a ninth."""
+    """A limit of the drive and four times the damping: the limit that does for both leaves a ninth."""
     limit, damping = found(first, "drive-saturation"), found(922.0, "viscous-friction")
     beside = {
         "drive-saturation": found(left, "drive-saturation", "frictional-lag"),
