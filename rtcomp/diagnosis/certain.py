@@ -34,7 +34,7 @@ BESIDE = (0.85, 1.18)
 MOVED = 0.02
 """Relative change of a parameter that is worth reporting."""
 AT_BOUND = 0.002
-"""Distance from the furthest that may be believed, over that, within which the belief holds a number there."""
+"""Relative distance from the furthest that may be believed, within which the belief holds a number there."""
 SEVERAL = 3
 """Numbers that must have moved for it to be said that all did."""
 FREEDOM, WIDE = 9, 2.262

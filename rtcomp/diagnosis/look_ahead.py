@@ -23,10 +23,10 @@ RIVALS, HOPELESS = 2, 100.0
 """Others tried so at the most, and times the error with the first that they may leave alone."""
 DONE = 3.0
 """Times the floor that two leave, below which no other two are tried."""
-MOST, FAR, SMALLER, MORE = 0.8, 100.0, 0.35, 3
+HIDING, HIDDEN, BEHIND, TRIED = 0.8, 100.0, 0.35, 3
 """Part of the error that the first must explain, and times the floor that it and its second must leave, for
-something large to be hidden behind it: then the gain of a rival may be this part of the first one's, and so
-many are tried."""
+something large to be hidden behind it: then the gain of a rival may be this part of the first one's, and up
+to so many are tried."""
 
 
 def look_ahead(
@@ -59,7 +59,7 @@ def look_ahead(
         return [r for r in named if float(r.errors.sum()) < (most if shapeless else min(most, hopeless))]
 
     rivals = gaining(HALF if shapeless else RIVAL)[:RIVALS]
-    hidden = gaining(SMALLER)[:MORE] if not shapeless and gain > MOST * float(base.errors.sum()) else []
+    hidden = gaining(BEHIND)[:TRIED] if not shapeless and gain > HIDING * float(base.errors.sum()) else []
     hidden = hidden[len(rivals) :]
     if not (rivals or hidden) or not worth_it(base.errors, best.errors, floor):
         return first, None
@@ -77,7 +77,7 @@ def look_ahead(
         bending = last(chosen) in SHAPELESS or _twice(chosen, ahead)
         if asked and left < done and not bending:
             break
-        if at >= len(rivals) and left < FAR * float(floor.sum()):
+        if at >= len(rivals) and left < HIDDEN * float(floor.sum()):
             break
         other = beside(rival)
         both = other.best

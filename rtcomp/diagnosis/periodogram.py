@@ -8,6 +8,8 @@ import numpy.typing as npt
 from rtcomp.kernels import Floats
 
 BINS = 8192
+BESIDE = 3
+"""Numbers of waves, in steps of the periodogram, on either side of a peak that belong to it."""
 FINE = 5
 """Waves tried for each whole number of them in the span."""
 
@@ -45,3 +47,14 @@ def periodogram(
     power = projected.real**2 / np.maximum(half + double, least)
     power += projected.imag**2 / np.maximum(half - double, least)
     return k / FINE, power
+
+
+def highest(n: Floats, power: Floats, peaks: int, same: float = 0.0) -> list[float]:
+    """Return the numbers of waves `n` of the highest `power`, none beside another or within the part `same`."""
+    left, found = power.copy(), []
+    for _ in range(peaks):
+        at = int(np.argmax(left))
+        found.append(float(n[at]))
+        left[max(at - BESIDE, 0) : at + BESIDE + 1] = 0.0
+        left[np.abs(np.log(n / n[at])) < same] = 0.0
+    return found

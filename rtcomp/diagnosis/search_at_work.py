@@ -9,9 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rtcomp.diagnosis.periodogram import periodogram
+from rtcomp.diagnosis.periodogram import highest, periodogram
 from rtcomp.diagnosis.scene import Entry, Point, Scene
-from rtcomp.kernels import Floats
 
 FOLLOWED = {"following": 1.0, "stiffening": 0.5}
 """Entries that what sticks follows: how much stiffer it becomes begins far from both ends, to be refined."""
@@ -175,26 +174,16 @@ def _cyclic_periods(s: Scene, peaks: int = 2) -> list[float]:
     most = min(MOST_WAVES, s.span / (3 * step))
     if most > LEAST_WAVES:
         n, power = periodogram(s.x, s.span, weight, s.residual, most)
-        found += _highest(s.span / n, np.where(n < LEAST_WAVES, 0.0, power), peaks)
+        found += highest(n, np.where(n < LEAST_WAVES, 0.0, power), peaks, SAME)
     waves, powers = [], []
     for low in LEAST_WAVES * 2.0 ** np.arange(np.log2(MOST_WAVES / LEAST_WAVES)):
         slow = speed < s.motion.cut * s.span / (np.sqrt(2.0) * low)
         n, power = periodogram(s.x, s.span, np.where(slow, weight, 0.0), s.residual, 2.0 * low)
         waves.append(n[n >= low])
         powers.append(power[n >= low])
-    others = _highest(s.span / np.concatenate(waves), np.concatenate(powers), peaks)
-    return found + [p for p in others if all(abs(np.log(p / q)) > SAME for q in found)]
-
-
-def _highest(periods: Floats, power: Floats, peaks: int) -> list[float]:
-    """Return the periods of the highest `power`, none beside another."""
-    left, found = power.copy(), []
-    for _ in range(peaks):
-        at = int(np.argmax(left))
-        found.append(float(periods[at]))
-        left[max(at - 3, 0) : at + 4] = 0.0
-        left[np.abs(np.log(periods / found[-1])) < SAME] = 0.0
-    return found
+    others = highest(np.concatenate(waves), np.concatenate(powers), peaks, SAME)
+    found += [n for n in others if all(abs(np.log(n / known)) > SAME for known in found)]
+    return [s.span / n for n in found]
 
 
 def _cyclic_size(s: Scene, period: float) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from rtcomp.diagnosis.periodogram import periodogram
+from rtcomp.diagnosis.periodogram import highest, periodogram
 from rtcomp.diagnosis.scene import Column, Entry, Scene
 from rtcomp.kernels import Floats
 
@@ -93,11 +93,7 @@ def _periods(s: Scene, weight: Floats, peaks: int = 4) -> list[float]:
     most = min(150.0, s.span / (6 * step))
     n, power = periodogram(s.x, s.span, weight, s.residual, max(most, 3.0))
     power[n < 2.5] = 0.0
-    for _ in range(peaks):
-        at = int(np.argmax(power))
-        found.append(s.span / float(n[at]))
-        power[max(at - 3, 0) : at + 4] = 0.0
-    return found
+    return found + [s.span / waves for waves in highest(n, power, peaks)]
 
 
 def _cogging(s: Scene) -> list[Column]:

@@ -27,6 +27,24 @@ def found(error: float, *names: str) -> Any:
     )
 
 
+def looked(
+    monkeypatch: pytest.MonkeyPatch, base: float, first: list[Any], beside: dict[str, Any], floor: float
+) -> tuple[Addition, Addition | None]:
+    """What a look ahead makes of entries that leave `first` alone, best first, and with others `beside`."""
+
+    def best_addition(stage: Any, motion: Any, current: Any, entries: Any, *rest: Any) -> Addition:
+        return Addition(beside[entries[0]["name"]], [], [], {})
+
+    monkeypatch.setattr(looking, "best_addition", best_addition)
+    best, *others = first
+    anything: Any = None
+    plain: Any = SimpleNamespace(errors=even(base))
+    added = Addition(best, others, [], {})
+    return looking.look_ahead(
+        anything, anything, plain, added, even(floor), lambda part, what: None, frozenset()
+    )
+
+
 @pytest.mark.parametrize(
     ("second", "left", "chosen"),
     [
@@ -38,22 +56,12 @@ def found(error: float, *names: str) -> Any:
 def test_two_waves_give_way_to_two_names_that_do_as_well(
     monkeypatch: pytest.MonkeyPatch, second: str, left: float, chosen: str
 ) -> None:
-    wave, spring = found(4.1, "cogging"), found(9.9, "parallel-spring")
+    alone = [found(4.1, "cogging"), found(9.9, "parallel-spring")]
     beside = {
         "cogging": found(left, "cogging", second),
         "parallel-spring": found(0.06, "parallel-spring", "drive-offset"),
     }
-
-    def best_addition(stage: Any, motion: Any, current: Any, entries: Any, *rest: Any) -> Addition:
-        return Addition(beside[entries[0]["name"]], [], [], {})
-
-    monkeypatch.setattr(looking, "best_addition", best_addition)
-    base: Any = SimpleNamespace(errors=even(58.0))
-    anything: Any = None
-    first = Addition(wave, [spring], [], {})
-    added, ahead = looking.look_ahead(
-        anything, anything, base, first, even(0.07), lambda part, what: None, frozenset()
-    )
+    added, ahead = looked(monkeypatch, 58.0, alone, beside, 0.07)
     assert added.best is not None and added.best.entries[-1]["name"] == chosen
     assert ahead is not None and ahead.best is beside[chosen]
 
@@ -61,11 +69,7 @@ def test_two_waves_give_way_to_two_names_that_do_as_well(
 @pytest.mark.parametrize(
     ("first", "left", "chosen"),
     [
-        (
-            169.0,
-            108.0,
-            "viscous-friction",
-        ),  # most is explained, and what is left is a thousand times the floor
+        (169.0, 108.0, "viscous-friction"),  # most is explained, a thousand times the floor left
         (169.0, 5.0, "drive-saturation"),  # nearly all is
         (400.0, 108.0, "drive-saturation"),  # the first is no more than the nearest
     ],
@@ -74,25 +78,10 @@ def test_what_is_far_behind_is_tried_where_something_large_is_left(
     monkeypatch: pytest.MonkeyPatch, first: float, left: float, chosen: str
 ) -> None:
     """A limit of the drive and four times the damping: the limit that does for both leaves a ninth."""
-    limit, damping = found(first, "drive-saturation"), found(922.0, "viscous-friction")
+    alone = [found(first, "drive-saturation"), found(922.0, "viscous-friction")]
     beside = {
         "drive-saturation": found(left, "drive-saturation", "frictional-lag"),
         "viscous-friction": found(0.11, "viscous-friction", "drive-saturation"),
     }
-
-    def best_addition(stage: Any, motion: Any, current: Any, entries: Any, *rest: Any) -> Addition:
-        return Addition(beside[entries[0]["name"]], [], [], {})
-
-    monkeypatch.setattr(looking, "best_addition", best_addition)
-    base: Any = SimpleNamespace(errors=even(1494.0))
-    anything: Any = None
-    added, _ = looking.look_ahead(
-        anything,
-        anything,
-        base,
-        Addition(limit, [damping], [], {}),
-        even(0.1),
-        lambda part, what: None,
-        frozenset(),
-    )
+    added, _ = looked(monkeypatch, 1494.0, alone, beside, 0.1)
     assert added.best is not None and added.best.entries[-1]["name"] == chosen

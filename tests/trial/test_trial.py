@@ -132,9 +132,8 @@ def test_a_trial_that_is_stopped_again_while_drawing_loses_nothing(tmp_path: Pat
     command = [*RTCOMP, "trial", "--out", str(out), "--resume", str(kept), "--rivals", "none"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as run:
         until = time.monotonic() + 60.0
-        taken = [
-            out / "diagnoses" / f"{name}.log" for name in answered
-        ]  # fast machines stop with two of them
+        # Fast machines stop with two of them.
+        taken = [out / "diagnoses" / f"{name}.log" for name in answered]
         while not all(log.exists() for log in taken) and time.monotonic() < until:
             time.sleep(0.02)
         assert not any((out / "cases").glob("*/train.csv.gz"))

@@ -11,6 +11,7 @@ from rtcomp.diagnosis.by_position.decide import Judge, Verdicts, decide, drop, s
 from rtcomp.diagnosis.by_position.sticking import count_of, hidden
 from rtcomp.diagnosis.by_position.turning import Knob, Setting, fit, robust
 from rtcomp.diagnosis.by_position.windows import Windows, windows_of
+from rtcomp.diagnosis.holding import HARM, HELP
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.result import Candidate, Diagnosis, Fit, Named, PositionFit, Retuned, Value, Verdict
@@ -28,9 +29,8 @@ MODEL = 0.005
 """Relative half width of an interval that no amount of data removes."""
 LEFT = 0.2
 """Part of the error above the floor that names may leave without it being said."""
-HARM, HELP, SMALL = 1.02, 0.95, 1.5
-"""Factors on the error of windows not seen: on that of the believed and the retuned stage, beyond which names
-are taken back; on the retuned stage's, which they must be below, unless below that many times the noise's."""
+SMALL = 1.5
+"""Times the noise's error of windows not seen, below which names need not help."""
 LONGEST = 0.5
 """Longest period of a wave along the stroke, in strokes: what was not seen twice is not known to recur."""
 UNITS = {
