@@ -50,7 +50,7 @@ def periodogram(
 
 
 def highest(n: Floats, power: Floats, peaks: int, same: float = 0.0) -> list[float]:
-    """Return the numbers of waves `n` of the highest `power`, none beside another or within the part `same`."""
+    """Return the numbers of waves `n` of the highest `power`, none beside another or within `same` of it."""
     left, found = power.copy(), []
     for _ in range(peaks):
         at = int(np.argmax(left))
