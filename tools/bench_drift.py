@@ -20,7 +20,8 @@ from figures_table import Figure, show
 from rtcomp.cli.runs import load
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
-from rtcomp.jobs.identify import ALWAYS, follow, friction, identify
+from rtcomp.jobs.follow import follow
+from rtcomp.jobs.identify import ALWAYS, friction, identify
 from rtcomp.jobs.judge import learning_curve
 from rtcomp.kernels import Floats
 from rtcomp.stage.stage import Stage

@@ -23,7 +23,8 @@ from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.hysteresis.rls import Rls
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
-from rtcomp.jobs.identify import follow, friction, identify
+from rtcomp.jobs.follow import follow
+from rtcomp.jobs.identify import friction, identify
 from rtcomp.jobs.judge import Friction, judge
 from rtcomp.jobs.session import Run
 from rtcomp.kernels import Floats, compiled

@@ -44,7 +44,8 @@ from rtcomp.hysteresis.shaped import ShapedIntervalBasis
 from rtcomp.hysteresis.stop import StopBasis
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
-from rtcomp.jobs.identify import Identified, follow, friction, identify
+from rtcomp.jobs.follow import follow
+from rtcomp.jobs.identify import Identified, friction, identify
 from rtcomp.jobs.judge import Friction
 from rtcomp.jobs.paper.rig import ASYMMETRY, SOFTENING
 from rtcomp.jobs.shape.choice import Motion as Recorded

@@ -48,6 +48,8 @@ class Reference:
         """s, of the whole run, delay included."""
         self.period = motion.period
         """s, after the start; None where nothing repeats."""
+        self.earlier = 0.0
+        """s of motion before time zero (`following_on.FollowingOn` has some)."""
 
     def evaluate(self, t: npt.ArrayLike) -> tuple[Floats, Floats, Floats]:
         """Return position (m), velocity (m/s) and acceleration (m/s^2) at the times `t` (s), of its shape.

@@ -15,7 +15,8 @@ from rtcomp.errors import LimitError
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.jobs.compensate import Tracking
 from rtcomp.jobs.configuration import Configuration
-from rtcomp.jobs.identify import follow, friction_level
+from rtcomp.jobs.follow import follow
+from rtcomp.jobs.identify import friction_level
 from rtcomp.jobs.session import Run, Watch
 from rtcomp.recording.acted import as_acted
 from rtcomp.recording.reader import Recording, read

@@ -27,8 +27,10 @@ OVERSAMPLED = 6.5
 """Rate over bandwidth, at the most: friction is exact over a displacement, finer rows only cost time."""
 WASHED = 2.2
 """Travel within a strip, in longest reaches, after which friction has forgotten what was before it."""
-LEAD = 0.2
+LEAD = 0.25
 """Part of a recording that may go by until then; else what was before it has to be taken as nothing."""
+FAINT = 0.02
+"""Part of all that friction holds, that may be of reaches too long to be waited for."""
 BLOCKS = 24
 UNSEEN = (3, 9, 14, 20)
 """Blocks that neither fitting nor selection sees."""
@@ -155,8 +157,16 @@ def unstepped(position: Floats, smoothed: float, rate: float) -> Floats:
 
 
 def longest_reach(friction: Effect | None) -> float:
-    """Return the travel (m) at which the last of the believed friction yields; 0 where that is not known."""
-    return max(r for _, r in friction.elements) if isinstance(friction, MaxwellSlip) else 0.0
+    """Return the travel (m) at which all but a FAINT part of the believed friction has yielded.
+
+    0 where that is not known. Identified friction has a reach for every place of its grid, the longest of
+    them often with next to no force.
+    """
+    if not isinstance(friction, MaxwellSlip):
+        return 0.0
+    stiffness, reach = np.array(sorted(friction.elements, key=lambda e: e[1])).T
+    held = np.cumsum(stiffness * reach)
+    return float(reach[np.argmax(held >= (1.0 - FAINT) * held[-1])])
 
 
 def _stretches(recording: Recording, reach: float) -> list[Strip]:

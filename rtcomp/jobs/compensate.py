@@ -11,7 +11,8 @@ import numpy as np
 from rtcomp.errors import ConfigError
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.jobs.configuration import Configuration
-from rtcomp.jobs.identify import ALWAYS, follow, model_of
+from rtcomp.jobs.follow import follow
+from rtcomp.jobs.identify import ALWAYS, model_of
 from rtcomp.jobs.session import Run, Watch, check
 from rtcomp.stage.stage import Stage
 

@@ -237,13 +237,16 @@ class Configuration:
         name = self.run.limits.stop_file
         return None if name is None else self.path.parent / name
 
-    def relaxing(self, start: float) -> Reference | None:
-        """Return the decaying reversals about `start` (m) of the section ``relax``, checked, if any."""
+    def relaxing(self, start: float) -> tuple[Reference, float] | None:
+        """Return the decaying reversals about `start` (m) of the section ``relax``, checked, if any.
+
+        And the time (s) over which the axis is let go after them: that of one stroke.
+        """
         relax = self.run.relax
         if relax is None:
             return None
         entry = {"kind": "nested-reversals", **relax.model_dump(), "offset": start, "start": start}
-        return self._checked(build_reference(reference_settings(entry)), "relax")
+        return self._checked(build_reference(reference_settings(entry)), "relax"), relax.stroke_time
 
     def reference(self, section: str = "", start: float | None = None) -> Reference:
         """Return the reference of `section` (``judge``, ``compensate``), else the main one, checked.

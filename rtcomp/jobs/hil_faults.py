@@ -22,9 +22,9 @@ from rtcomp_drivers.registry import create
 from rtcomp.errors import ConfigError, DeviceError
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.jobs.configuration import Configuration
+from rtcomp.jobs.follow import where_it_stands
 from rtcomp.jobs.forked_loop import RUNNING_TICKS, ForkedLoop
 from rtcomp.jobs.hil_device import device_on, patient, plant_on
-from rtcomp.jobs.identify import where_it_stands
 from rtcomp.jobs.session import make_device
 from rtcomp.loop.device import Armable
 from rtcomp.loop.realtime import realtime_process

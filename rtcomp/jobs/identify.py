@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rtcomp.control.references import Reference
 from rtcomp.errors import Interrupted, RecordingError
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.hysteresis.shaped import ShapedIntervalBasis
-from rtcomp.jobs.arming import permit
 from rtcomp.jobs.configuration import Configuration
+from rtcomp.jobs.follow import follow
 from rtcomp.jobs.judge import Friction, Judgement, friction_of, judge, learning_curve
 from rtcomp.jobs.known import completed
-from rtcomp.jobs.lead import NOTHING, lead_volts
 from rtcomp.jobs.motion_notes import motion_notes, still_rising
-from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
+from rtcomp.jobs.plan import VoltagePlan
 from rtcomp.jobs.session import Run, Watch, check, make_device, make_tick, run_loop, stopped
 from rtcomp.jobs.shape.that_pays import that_pays
 from rtcomp.kernels import Floats
-from rtcomp.loop.device import Armable, Device
 from rtcomp.loop.tick import Tick
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.balance import bandwidth, known_force, zero_phase
-from rtcomp.stage.stage import Stage
 
 ALWAYS = (0.0, float("inf"))
 
@@ -120,65 +116,6 @@ def identify(
             notes.append(f"judging {error}; {unjudged}")
     curve = learning_curve(learned.tick.basis, learned.weights, learned.tick.offset_scale, on, settle=settle)
     return Identified(config, model, learned, in_sample, held_out, learned.weights_time, curve, notes, number)
-
-
-def follow(
-    config: Configuration,
-    section: str,
-    *,
-    learn: tuple[float, float] | None = None,
-    model: HysteresisModel | None = None,
-    stage: Stage | None = None,
-    feedforward_from: float | None = None,
-    feedforward_fade: float = 0.0,
-    path: Path | None = None,
-    watch: Watch | None = None,
-    partial: bool = False,
-) -> Run:
-    """Run the loop along the reference of `section` to its end, with or without learning and feedforward.
-
-    A real device is relaxed first, and followed from where it stands. With `stage` the whole feedforward is
-    that stage's (`lead.lead_volts`) in place of the model's. `partial` as `run_loop` takes it.
-    """
-    device = make_device(config)
-    start = None
-    if config.real_device:
-        start = where_it_stands(device)
-        permit(config, device, start, config.reference(section, start))
-        relaxing = config.relaxing(start)
-        if relaxing is not None:
-            config.reference(section, start)  # refuse what cannot be followed before anything moves
-            run_loop(config, _plan(config, relaxing, device), device, make_tick(config, device.delay_ticks))
-            start = where_it_stands(device)
-    plan = replace(
-        _plan(config, config.reference(section, start), device),
-        learn=learn,
-        feedforward_from=feedforward_from,
-        feedforward_fade=feedforward_fade,
-    )
-    if stage is not None:
-        model = NOTHING
-        plan = replace(plan, lead=lead_volts(stage, plan.reference, plan.period, plan.ticks, plan.delay_ticks,
-                                             clock=not config.real_device))  # fmt: skip
-    tick = make_tick(config, device.delay_ticks, model)
-    return run_loop(config, plan, device, tick, path=path, watch=watch, partial=partial)
-
-
-def _plan(config: Configuration, reference: Reference, device: Device) -> ReferencePlan:
-    ticks = max(16, round(reference.duration * config.stage.rate))
-    return ReferencePlan(reference, config.stage, config.period, ticks, device.delay_ticks)
-
-
-def where_it_stands(device: Device) -> float:
-    """Open the device, ask for its position (m), close it. Raises DeviceError.
-
-    Where the device can be looked at, nothing is armed for that.
-    """
-    device.open()
-    try:
-        return (device.look() if isinstance(device, Armable) else device.exchange(0.0)).position
-    finally:
-        device.close()
 
 
 def learning_window(config: Configuration) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rtcomp.control.following_on import FollowingOn
 from rtcomp.control.references import Reference
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.model import HysteresisModel
@@ -43,7 +44,7 @@ _LEAST_GAIN = 1e-2
 
 def lead_volts(
     stage: Stage,
-    reference: Reference,
+    reference: Reference | FollowingOn,
     period: float,
     ticks: int,
     delay_ticks: int = 0,
@@ -51,6 +52,8 @@ def lead_volts(
     clock: bool = True,
 ) -> Floats:
     """Return the command (V, (ticks,)) of each tick with which `stage` follows `reference`, from rest.
+
+    Friction remembers the motion before time zero, if there is one (`FollowingOn`).
 
     A tick is `period` (s); a command takes effect `delay_ticks` after the tick it is computed at and is held
     for one. With `clock` false what goes by the time since the stage's start (`BY_CLOCK`) is left out: a real
@@ -62,11 +65,11 @@ def lead_volts(
     drive = [e for e in chain if e.place is Place.DRIVE and e.order < FORCE_ORDER]
     body = [e for e in chain if e.place is not Place.SENSOR and e not in drive]
     ahead = delay_ticks * period + held(drive, period) + _total(drive, "drive-delay")
-    before = math.ceil(ahead / period - 1e-9)  # rows at rest first, where memory begins
-    acts: Floats = np.arange(-before, ticks, dtype=np.float64) * period + ahead
+    rows = math.ceil((ahead + reference.earlier) / period - 1e-9)  # at rest first, where memory begins
+    acts: Floats = np.arange(-rows, ticks, dtype=np.float64) * period + ahead
     motion = _true_motion(sensor, reference, acts, period)
     volts = _needed(stage, body, acts, *motion) / stage.force_constant
-    return _commanded(drive, acts, motion[0], volts, stage.voltage_limit)[before:]
+    return _commanded(drive, acts, motion[0], volts, stage.voltage_limit)[rows:]
 
 
 def held(drive: Sequence[Effect], period: float) -> float:
@@ -89,7 +92,7 @@ def _total(effects: Sequence[Effect], name: str) -> float:
 
 
 def _true_motion(
-    sensor: Sequence[Effect], reference: Reference, acts: Floats, period: float
+    sensor: Sequence[Effect], reference: Reference | FollowingOn, acts: Floats, period: float
 ) -> tuple[Floats, Floats, Floats]:
     """Return position, velocity and acceleration of the stage whose reading follows the reference."""
     read = acts + _total(sensor, "sensor-delay")

@@ -15,6 +15,7 @@ from rtcomp.loop.tick import (
     LEAD_FORCE,
     LEAD_POSITION,
     LEARN,
+    LET_GO,
     PLAN_WIDTH,
     REFERENCE,
     VOLTS,
@@ -45,6 +46,8 @@ class ReferencePlan:
     lead: Floats | None = None
     """V, (ticks,): the whole feedforward of each tick (`lead.lead_volts`), in place of the stage's inertia
     and known forces. Made beforehand as one piece, since friction remembers."""
+    let_go: float = 0.0
+    """s at the end, over which the whole command dies out: an axis let go at once swings."""
 
     def rows(self, first: int, count: int) -> Floats:
         """Return rows `first` to `first + count`, shape (count, PLAN_WIDTH)."""
@@ -68,6 +71,8 @@ class ReferencePlan:
             fade = self.feedforward_fade
             share = smooth_step(since / fade)[0] if fade > 0 else np.ones(count)
             out[:, FEEDFORWARD] = np.where(since >= 0, share, 0.0)
+        if self.let_go > 0.0:
+            out[:, LET_GO] = smooth_step(1.0 - (self.ticks * self.period - t) / self.let_go)[0]
         return out
 
 

@@ -298,7 +298,7 @@ def tick_kernel(
         feedback = pid_step(c.pid_p, c.pid_s, error, position, state[at.EXCESS])
     feedforward = state[at.SHARE] * full if plan[at.FEEDFORWARD] > 0.0 else 0.0
     state[at.HANDED] = feedforward
-    asked = feedback + feedforward
+    asked = (1.0 - plan[at.LET_GO]) * (feedback + feedforward)
     volts = limit_step(c.limit_p, c.limit_s, asked)
     row[at.ROW_FEEDFORWARD] = feedforward
     row[at.ROW_FEEDBACK] = feedback

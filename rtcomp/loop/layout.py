@@ -5,11 +5,12 @@ Numbers only, so that every compiled part of the tick (`tick`, `checks`, `pace`)
 
 from __future__ import annotations
 
-REFERENCE, LEAD_POSITION, LEAD_FORCE, KNOWN, FEEDFORWARD, LEARN, VOLTS = range(7)
+REFERENCE, LEAD_POSITION, LEAD_FORCE, KNOWN, FEEDFORWARD, LEARN, VOLTS, LET_GO = range(8)
 """Columns of a plan. Reference at the tick (m); reference where the command will act (m); force needed
 there but for hysteresis (N); forces known to have acted around the tick before, other than inertia and
-viscous friction (N); share of feedforward (0 to 1); whether to learn (0 or 1); command in open loop (V)."""
-PLAN_WIDTH = 7
+viscous friction (N); share of feedforward (0 to 1); whether to learn (0 or 1); command in open loop (V);
+share of the whole command that is taken off (0 to 1)."""
+PLAN_WIDTH = 8
 
 COLUMNS = (
     "time", "reference", "position", "voltage", "force", "force_model", "feedforward", "feedback",

@@ -13,7 +13,16 @@ from rtcomp.diagnosis.bank import units_along
 from rtcomp.diagnosis.base import fit_base
 from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.ledger import Ledger, believed_weights, grid_of
-from rtcomp.diagnosis.motion import UNSEEN, WASHED, WINDOW_ROWS, WINDOWS, Strip, averaged, prepare
+from rtcomp.diagnosis.motion import (
+    UNSEEN,
+    WASHED,
+    WINDOW_ROWS,
+    WINDOWS,
+    Strip,
+    averaged,
+    longest_reach,
+    prepare,
+)
 from rtcomp.diagnosis.refine import consistent, refine
 from rtcomp.diagnosis.remembered import Memory
 from rtcomp.kernels import Floats
@@ -91,6 +100,15 @@ def test_nothing_is_compared_until_friction_has_forgotten_what_was_before() -> N
     travelled = np.ptp(strip.position[: strip.lead + 1])
     assert WASHED * 1.2e-5 <= travelled <= 1.3 * WASHED * 1.2e-5
     assert motion.kept(strip).start > strip.lead
+
+
+@pytest.mark.parametrize(("stiffness", "waited_for"), [(1e-13, 1.2e-5), (1e2, 1.2e-5), (1e4, 5e-5)])
+def test_no_reach_that_holds_next_to_nothing_is_waited_for(stiffness: float, waited_for: float) -> None:
+    """The grid of an identified operator ends in reaches without any force."""
+    more = [{"stiffness": 1e-13, "reach": 4.8e-5}, {"stiffness": stiffness, "reach": 5e-5}]
+    friction = [*more, *STAGE["stage"]["friction"]]
+    assert longest_reach(stage(friction=friction).friction) == waited_for
+    assert longest_reach(None) == 0.0
 
 
 def test_windows_of_a_long_recording_bring_their_lead_along() -> None:

@@ -10,7 +10,8 @@ import pytest
 from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.jobs.configuration import Configuration
-from rtcomp.jobs.identify import follow, friction, friction_level, identify
+from rtcomp.jobs.follow import follow
+from rtcomp.jobs.identify import friction, friction_level, identify
 from rtcomp.jobs.judge import judge, learning_curve, reached
 from rtcomp.loop.tick import COLUMNS
 from rtcomp.recording.reader import read

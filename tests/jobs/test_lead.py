@@ -9,7 +9,7 @@ from rtcomp import physics
 from rtcomp.control.references import Reference
 from rtcomp.errors import ConfigError
 from rtcomp.jobs.compensate import Tracking, compensate
-from rtcomp.jobs.identify import follow
+from rtcomp.jobs.follow import follow
 from rtcomp.jobs.lead import BY_CLOCK, held, lead_volts
 from rtcomp.jobs.plan import ReferencePlan
 from rtcomp.loop.tick import LEAD_FORCE

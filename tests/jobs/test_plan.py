@@ -12,6 +12,7 @@ from rtcomp.loop.tick import (
     LEAD_FORCE,
     LEAD_POSITION,
     LEARN,
+    LET_GO,
     PLAN_WIDTH,
     REFERENCE,
     VOLTS,
@@ -66,6 +67,14 @@ def test_learning_and_feedforward_keep_to_their_times(leuven):
     at_once = planned(leuven, feedforward_from=0.5)[1].rows(0, 2000)[:, FEEDFORWARD]
     assert np.array_equal(at_once, (t >= 0.5).astype(float))
     assert not planned(leuven)[1].rows(0, 2000)[:, [FEEDFORWARD, LEARN]].any()
+
+
+def test_an_axis_is_let_go_at_the_end_and_not_before(leuven):
+    _, plan = planned(leuven, let_go=0.3)
+    taken = plan.rows(0, 2000)[:, LET_GO]
+    assert not taken[:1700].any() and taken[1750:].all()
+    assert (np.diff(taken) >= 0.0).all() and np.diff(taken).max() < 0.01 and taken[-1] > 0.999
+    assert not planned(leuven)[1].rows(0, 2000)[:, LET_GO].any()
 
 
 def test_voltages_as_they_are(leuven):

@@ -27,7 +27,7 @@ from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.lms import Lms
 from rtcomp.hysteresis.rls import Rls
 from rtcomp.loop.run import warm_up
-from rtcomp.loop.tick import FEEDFORWARD, KNOWN, LEAD_FORCE, LEAD_POSITION, LEARN, REFERENCE
+from rtcomp.loop.tick import FEEDFORWARD, KNOWN, LEAD_FORCE, LEAD_POSITION, LEARN, LET_GO, REFERENCE
 
 
 def written_out(table, position, *, delay, smoothing, gate, learner, start, period=1e-3):
@@ -162,6 +162,20 @@ def test_feedforward_fades_in_without_a_jump():
     assert error[900:].max() < 0.2 * error[:600].max()
     steps = np.abs(np.diff(left.column("voltage")))
     assert steps[595:805].max() < 2 * steps[300:595].max()
+
+
+def test_an_axis_that_is_let_go_comes_to_rest_without_a_swing():
+    """Its command dies out whatever feedback asks for, and it springs back no further than it then stands."""
+    the_plan = plan(2500, learn=False, share=1.0)
+    the_plan.table[1500:, [REFERENCE, LEAD_POSITION]] = the_plan.table[1500, REFERENCE]
+    the_plan.table[1500:, LEAD_FORCE] = 0.0
+    the_plan.table[:, LET_GO] = np.clip((np.arange(2500) - 2000) / 300, 0.0, 1.0)
+    left = go(device(stage()), tick(weights=np.append(WEIGHTS, 0.0)), the_plan)
+    volts, position = left.column("voltage"), left.column("position")
+    assert abs(volts[1999]) > 0.1 and not volts[2301:].any()
+    back = np.abs(position[2000:] - position[1999])
+    print(back.max(), back[-1], volts[1999])
+    assert back[-1] > 3e-7 and back.max() < 1.05 * back[-1]
 
 
 def test_right_weights_cancel_the_friction():

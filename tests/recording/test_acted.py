@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rtcomp.jobs.configuration import Configuration
-from rtcomp.jobs.identify import follow
+from rtcomp.jobs.follow import follow
 from rtcomp.jobs.replay import replay
 from rtcomp.jobs.simulate import closed_loop
 from rtcomp.recording.acted import as_acted
