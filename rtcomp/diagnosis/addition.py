@@ -29,6 +29,8 @@ QUICK, CONTENDERS = 2, 3
 FAR, FURTHER, NOTHING = 3.0, 100.0, 0.01
 """Times the error of the first after those few steps, from which on another is refined to the end only if the
 first leaves more than this part of what there was: if it is a name, if it is a free curve."""
+SURPASSED = 25.0
+"""Times a known error, above which none but the nearest are refined to the end."""
 NEARLY = 0.93
 """Part of what a shapeless entry explains, from which on a name with a shape of its own is preferred."""
 BESIDE = {
@@ -73,8 +75,12 @@ def best_addition(
     entries: list[Entry],
     progress: Progress,
     without: frozenset[str] = frozenset(),
+    known: float = 0.0,
 ) -> Addition:
-    """Return what explains most of what `current`, with `entries` at work, leaves; no name of `without`."""
+    """Return what explains most of what `current`, with `entries` at work, leaves; no name of `without`.
+
+    Where a squared error (N^2) is `known` to be reached, what is far behind that is not refined to the end.
+    """
     looked = screen(Scene.of(motion, current), entries, lambda part: progress(0.6 * part, "screen"))
     named = {str(e["name"]) for e in entries} - {"cogging"} | without
     named |= {BESIDE[n] for n in named if n in BESIDE}
@@ -98,7 +104,7 @@ def best_addition(
     tried.sort(key=lambda r: float(r.errors.sum()))
     if not tried:
         return Addition(None, [], looked, gains)
-    _settle_contenders(stage, motion, current, tried, also)
+    _settle_contenders(stage, motion, current, tried, also, known)
     gains |= {last(r): 1.0 - float(r.errors.sum() / current.errors.sum()) for r in tried}
     tried = plainest(tried)
     best = least_far(tried, current)
@@ -168,7 +174,12 @@ def _quickly(current: Fitted, motion: Motion, entries: list[Entry], screened: Sc
 
 
 def _settle_contenders(
-    stage: Stage, motion: Motion, current: Fitted, tried: list[Refined], also: dict[str, list[Refined]]
+    stage: Stage,
+    motion: Motion,
+    current: Fitted,
+    tried: list[Refined],
+    also: dict[str, list[Refined]],
+    known: float = 0.0,
 ) -> None:
     """Replace the best of `tried`, best first, by what they are on reaches of their own, in the best form.
 
@@ -190,6 +201,7 @@ def _settle_contenders(
         for at in group:
             own = [found for (of, _), found in zip(forms, settled, strict=True) if of == at]
             tried[at] = min(own, key=_weighed)
+        contend = [at for at in contend if not known or left[at] < SURPASSED * known]
         # A free curve that leaves nothing says nothing against a name, unless that is far behind.
         if float(tried[0].errors.sum()) < NOTHING * whole:
             contend = [at for at in contend if shapeless and left[at] < FURTHER * first]

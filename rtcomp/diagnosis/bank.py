@@ -58,15 +58,15 @@ def units_along(
     row = float((motion[-1, 0] - motion[0, 0]) / max(motion.shape[0] - 1, 1))
     parts = parts_of([*before, *after], row)
     out = np.empty((motion.shape[0], SPEED_UNITS + len(reaches)))
-    rising, falling = (np.zeros_like(out) if parts > 1 else out[:1] for _ in range(2))
+    mean = np.zeros_like(out) if parts > 1 else out[:1]
     w = np.zeros(COUNT)
     w[GRAIN] = grain
     base = np.array([stage.mass, stage.force_constant])
     _along(
         program.steps, program.p, program.s, w, base, motion, parts, len(before), len(bent), weights, reaches,
-        out, rising, falling,
+        out, mean,
     )  # fmt: skip
-    return around_rows(out) if parts == 1 else rising + np.append(falling[1:], falling[-1:], axis=0)
+    return around_rows(out) if parts == 1 else mean
 
 
 @compiled
@@ -83,15 +83,14 @@ def _along(
     weights: Floats,
     reaches: Floats,
     out: Floats,
-    rising: Floats,
-    falling: Floats,
+    mean: Floats,
 ) -> None:
     """Fill `out` with forces at the rows: units of speed are the effects from `first` on.
 
-    Where rows are cut into `parts`, also their means over the row before each, weighed by what has passed
-    of it (`rising`) and by what is to come (`falling`). After those units come `bent` effects that bend
-    branches. What else changes the whole of friction is shared out among the elements in proportion to what
-    each holds.
+    Where rows are cut into `parts`, also their `mean` around each row: over the row before it weighed by what
+    has passed of that, and over the row after it by what is to come. After those units come `bent` effects
+    that bend branches. What else changes the whole of friction is shared out among the elements in proportion
+    to what each holds.
     """
     count = weights.size
     then = first + SPEED_UNITS
@@ -101,9 +100,10 @@ def _along(
         level += weights[i] * reaches[i]
         stiffness += weights[i]
     last = np.zeros(out.shape[1])
+    end = motion.shape[0] - 1
     for k in range(motion.shape[0]):
         for j in range(1, parts + 1):
-            along_row(w, motion, k, j, parts)
+            along_row(w, motion, k, float(j), parts)
             renew(w, base[0], base[1])
             w[GRIP_LEVEL], w[GRIP_STIFFNESS] = level, stiffness
             run_chain(steps, p, s, w, 0, first)
@@ -126,16 +126,20 @@ def _along(
                 _bend(steps, p, s, w, then, total, level, weights, reaches, held)
             whole = w[FRICTION]
             run_chain(steps, p, s, w, then + bent, steps[0])
-            if whole != 0.0:
-                for i in range(SPEED_UNITS, out.shape[1]):
-                    out[k, i] *= w[FRICTION] / whole
+            if whole != 0.0 and w[FRICTION] != whole:
+                grown = w[FRICTION] / whole
+                for i in range(count):
+                    held[i] *= grown
             if parts > 1:
                 passed = (j - 0.5) / parts
                 for i in range(out.shape[1]):
                     share = 0.5 * (last[i] + out[k, i]) / parts
                     last[i] = out[k, i]
-                    rising[k, i] += passed * share
-                    falling[k, i] += (1.0 - passed) * share
+                    mean[k, i] += passed * share
+                    if k > 0:
+                        mean[k - 1, i] += (1.0 - passed) * share
+                    if k == end:  # what comes after the last row is taken to be as before it
+                        mean[k, i] += (1.0 - passed) * share
 
 
 @compiled

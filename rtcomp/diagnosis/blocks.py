@@ -29,17 +29,17 @@ class Blocks:
     @classmethod
     def of(cls, columns: Floats, y: Floats, block: np.ndarray, count: int) -> Blocks:
         """Gather from `columns` (n, p), `y` (n,), and the block number of every row (n,), sorted."""
-        norms = np.linalg.norm(columns, axis=0)
-        scale = np.where(norms > 0, norms, 1.0)
-        a = columns / scale
         edges = np.searchsorted(block, np.arange(count + 1))
-        gram, cross, power = [], [], []
+        grams, crosses, power = [], [], []
         for first, last in pairwise(edges):
-            part, target = a[first:last], y[first:last]
-            gram.append(part.T @ part)
-            cross.append(part.T @ target)
+            part, target = columns[first:last], y[first:last]
+            grams.append(part.T @ part)
+            crosses.append(part.T @ target)
             power.append(target @ target)
-        return cls(np.array(gram), np.array(cross), np.array(power), scale)
+        gram = np.array(grams)
+        norms = np.sqrt(np.einsum("kii->i", gram))
+        scale = np.where(norms > 0, norms, 1.0)
+        return cls(gram / np.outer(scale, scale), np.array(crosses) / scale, np.array(power), scale)
 
     def extended(self, columns: Floats, more: Floats, y: Floats, block: np.ndarray) -> Blocks:
         """Return the statistics with further columns `more` (n, q) beside those (n, p) that these are of."""

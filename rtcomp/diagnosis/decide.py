@@ -215,15 +215,16 @@ def _exchange(
             break  # it was found beside these others
         others = left_out(refined.entries, at)
         fewer = settle(stage, motion, refine(refined.fitted, motion, others, tries=3))
-        added = best_addition(stage, motion, fewer.fitted, fewer.entries, progress, without)
+        known = float(refined.errors.sum())
+        added = best_addition(stage, motion, fewer.fitted, fewer.entries, progress, without, known)
         best = added.best
         if best is None:
             continue
         now = str(refined.entries[at]["name"])
         same = any({last(best), now} <= set(group) for group in ((now,), *ONE_THING))
-        if not same and float(best.errors.sum()) > EXCHANGED * float(refined.errors.sum()):
+        if not same and float(best.errors.sum()) > EXCHANGED * known:
             # What it was not told from alone may be told from it with the others at work.
-            most = APART * float(refined.errors.sum())
+            most = APART * known
             near = {last(r) for r in (best, *added.others) if float(r.errors.sum()) <= most}
             near |= {name for group in ONE_THING if now in group for name in group}
             choices[at].names[1:] = [n for n in choices[at].names[1:] if n in near]

@@ -24,7 +24,7 @@ from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place
 from rtcomp.physics.closing import ClosingBranches
 from rtcomp.physics.maxwell_slip import MaxwellSlip
-from rtcomp.stage.balance import PARTS, STEADY, around_rows, forces
+from rtcomp.stage.balance import around_rows, forces, parts_of_drive
 from rtcomp.stage.stage import Stage
 
 MASS, VISCOUS, MICRO, BIAS = "mass", "viscous", "micro_damping", "bias"
@@ -263,8 +263,7 @@ class Ledger:
         chain = sorted([*self._drive(), *drive], key=lambda e: e.order)
         held = np.append(strip.voltage[:1], strip.voltage[:-1])
         # What remembers, or depends on position, changes within a row; the mean over the row is what moved.
-        parts = PARTS if any(e.name not in STEADY for e in chain) else 1
-        f = forces(self.stage, chain, strip.time, x, v, a, held, parts=parts)
+        f = forces(self.stage, chain, strip.time, x, v, a, held, parts=parts_of_drive(chain))
         return 0.5 * (f.drive + np.append(f.drive[1:], f.drive[-1:])) + around_rows(f.push)
 
     def _drive(self) -> list[Effect]:

@@ -93,7 +93,8 @@ class Motion:
     def smooth(self, rows: Sequence[Floats]) -> Floats:
         """Smooth an array a strip, (n_i,) or (n_i, p), below the cut; join what is compared of the strips."""
         parts = zip(self.strips, rows, strict=True)
-        return np.concatenate([zero_phase(r, self.cut, self.rate)[self.kept(s)] for s, r in parts])
+        smoothed = [zero_phase(r, self.cut, self.rate)[self.kept(s)] for s, r in parts]
+        return np.ascontiguousarray(smoothed[0]) if len(smoothed) == 1 else np.concatenate(smoothed)
 
     @property
     def edge(self) -> int:

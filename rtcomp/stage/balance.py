@@ -36,10 +36,11 @@ from rtcomp.stage import lowpass
 from rtcomp.stage.sensed import true_position
 from rtcomp.stage.stage import Stage
 
-STEADY = {"drive-offset", "drive-deadband", "drive-saturation", "drive-gain", "drive-force"}
-"""Effects of the drive whose force does not change while the command is held."""
-PARTS = 32
-"""Parts of a row over which the force of another drive is averaged. The mean is that of their ends, half a
+STEADY = {"drive-offset", "drive-deadband", "drive-saturation", "drive-gain", "drive-force", "cogging"}
+"""Effects of the drive that do not change its force while the command is held: cogging pushes beside it."""
+PARTS, MIDDLES = 32, 8
+"""Parts of a row over which the force of another drive is averaged: one that remembers, and one that goes by
+the motion alone, of which the middles of parts are taken. Of the first the mean is that of their ends, half a
 part late: at 8 the time constant of a lag came out a sixteenth of a row too large."""
 
 
@@ -92,7 +93,8 @@ def forces(
 
     `position` is the true one; effects of the sensor are left out. `volts` is the command that was held up
     to each row. Motion there and back within `grain` (m) is noise. Rows are cut into `parts`, or more where
-    an effect needs it; the drive's force is the mean over them, the others are those at the row.
+    an effect needs it; the drive's force is the mean over them (of their middles where nothing in the chain
+    remembers), the others are those at the row.
     """
     program = Program([e for e in chain if e.place is not Place.SENSOR])
     out = np.zeros((6, time.size))
@@ -102,8 +104,16 @@ def forces(
     base = np.array([stage.mass, stage.force_constant])
     w = np.zeros(wires.COUNT)
     w[GRAIN] = grain
-    _along(program.steps, program.p, program.s, w, base, motion, max(needed, parts), needed > 1, out)
+    parts = max(needed, parts)
+    middle = parts > 1 and needed == 1 and program.s.size == 1  # a spare one: nothing remembers
+    _along(program.steps, program.p, program.s, w, base, motion, parts, needed > 1, middle, out)
     return Forces(*out)
+
+
+def parts_of_drive(drive: Sequence[Effect]) -> int:
+    """Return the parts of a row over which the force of `drive` is to be averaged."""
+    varying = [e for e in drive if e.name not in STEADY]
+    return 1 if not varying else PARTS if any(e.initial_state().size for e in drive) else MIDDLES
 
 
 def parts_of(chain: Sequence[Effect], row: float) -> int:
@@ -113,8 +123,8 @@ def parts_of(chain: Sequence[Effect], row: float) -> int:
 
 
 @compiled
-def along_row(w: Floats, motion: Floats, k: int, j: int, parts: int) -> None:
-    """Put the wires to the end of part `j` of `parts` of row `k` of a motion.
+def along_row(w: Floats, motion: Floats, k: int, j: float, parts: int) -> None:
+    """Put the wires to the end of part `j` (less a half: its middle) of `parts` of row `k` of a motion.
 
     `motion` is (K, 5): time (s), position (m), velocity, acceleration, the command held up to each row (V).
     """
@@ -132,7 +142,7 @@ def along_row(w: Floats, motion: Floats, k: int, j: int, parts: int) -> None:
 @compiled
 def _along(
     steps: np.ndarray, p: Floats, s: Floats, w: Floats, base: Floats, motion: Floats, parts: int, fast: bool,
-    out: Floats,
+    middle: bool, out: Floats,
 ) -> None:  # fmt: skip
     """Fill `out`: the mean of the drive's force over the row's parts, the rest as it is at the row's end.
 
@@ -142,7 +152,7 @@ def _along(
     for k in range(motion.shape[0]):
         drive = 0.0
         for j in range(1, parts + 1):
-            along_row(w, motion, k, j, parts)
+            along_row(w, motion, k, j - 0.5 if middle else float(j), parts)
             renew(w, base[0], base[1])
             run_chain(steps, p, s, w, 0, steps[0])
             drive += w[DRIVE] / parts
@@ -153,6 +163,10 @@ def _along(
                 last = now
                 out[4, k] += share * (j - 0.5) / parts
                 out[5, k] += share * (1.0 - (j - 0.5) / parts)
+        if middle:
+            along_row(w, motion, k, float(parts), parts)
+            renew(w, base[0], base[1])
+            run_chain(steps, p, s, w, 0, steps[0])
         out[0, k], out[1, k], out[2, k], out[3, k] = drive, w[PUSH], w[FRICTION], w[MASS]
 
 
@@ -206,10 +220,8 @@ def balance_along(
     held = np.append(voltage[:1], voltage[:-1])
     motion = forces(stage, stage.chain, time, position, velocity, acceleration, held, grain)
     needed = motion.mass * acceleration - motion.others()
-    varying = any(e.name not in STEADY for e in drive)
-    over = forces(
-        stage, drive, time, position, velocity, acceleration, held, parts=PARTS if varying else 1
-    ).drive
+    parts = parts_of_drive(drive)
+    over = forces(stage, drive, time, position, velocity, acceleration, held, parts=parts).drive
     given = 0.5 * (over + np.append(over[1:], over[-1:]))
     return Balance(zero_phase(given, cut, 1.0 / period), zero_phase(needed, cut, 1.0 / period), cut)
 
@@ -222,8 +234,20 @@ def around_rows(force: Floats) -> Floats:
     fourth order. At a tenth of the rate the middle value alone would be 3 % too large.
     """
     mean = np.array(force)
-    mean[1:-1] = (force[:-2] + 10.0 * force[1:-1] + force[2:]) / 12.0
+    _around(mean.reshape(mean.shape[0], -1))
     return mean
+
+
+@compiled
+def _around(x: Floats) -> None:
+    """Replace all rows of `x`, (K, p), but the first and last, in one pass."""
+    rows, columns = x.shape
+    before = x[0].copy()
+    for k in range(1, rows - 1):
+        for j in range(columns):
+            now = x[k, j]
+            x[k, j] = (before[j] + 10.0 * now + x[k + 1, j]) / 12.0
+            before[j] = now
 
 
 def zero_phase(signal: Floats, cutoff_hz: float, rate_hz: float) -> Floats:

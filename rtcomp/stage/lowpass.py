@@ -44,7 +44,7 @@ def zero_phase(signal: Floats, cut_hz: float, rate_hz: float) -> Floats:
     out = np.concatenate([2 * rows[0] - rows[PAD:0:-1], rows, 2 * rows[-1] - rows[-2 : -PAD - 2 : -1]])
     one = section(cut_hz, rate_hz)
     _there_and_back(one, resting(one), out.reshape(out.shape[0], -1))
-    return out[PAD:-PAD].copy()
+    return out[PAD:-PAD]
 
 
 @compiled

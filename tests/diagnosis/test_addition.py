@@ -78,8 +78,8 @@ def test_a_drift_is_found_beside_a_wave_that_it_moves_along() -> None:
     assert wave["phase"] == pytest.approx(0.5, abs=0.1)
 
 
-def test_a_plainer_name_is_settled_as_what_is_it_and_more_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Else what frees the number comes before the number, as only that is refined together with others."""
+def contending(monkeypatch: pytest.MonkeyPatch, left: dict[str, float], known: float = 0.0) -> list[str]:
+    """Names of those that are settled where they leave so much of 67 N^2 after a few steps."""
     settled: list[str] = []
 
     def settling(_stage: Any, _motion: Any, refined: Any) -> Any:
@@ -88,12 +88,28 @@ def test_a_plainer_name_is_settled_as_what_is_it_and_more_is(monkeypatch: pytest
 
     monkeypatch.setattr(addition, "_well_settled", settling)
     monkeypatch.setattr(addition, "shared", lambda call, items: list(map(call, items)))
-    left = {"drive-gain": 3.2, "asymmetric-viscous-friction": 3.3, "sensor-scale": 3.4, "quadratic-drag": 3.5}
-    left |= {"viscous-friction": 5.4, "inertia": 5.5}
     tried: list[Any] = [SimpleNamespace(entries=[{"name": n}], errors=np.array([e])) for n, e in left.items()]
     current: Any = SimpleNamespace(errors=np.array([67.0]))
-    addition._settle_contenders(current, current, current, tried, {})
-    assert settled == [*list(left)[:3], "viscous-friction"]
+    addition._settle_contenders(current, current, current, tried, {}, known)
+    return settled
+
+
+def test_a_plainer_name_is_settled_as_what_is_it_and_more_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else what frees the number comes before the number, as only that is refined together with others."""
+    left = {"drive-gain": 3.2, "asymmetric-viscous-friction": 3.3, "sensor-scale": 3.4, "quadratic-drag": 3.5}
+    left |= {"viscous-friction": 5.4, "inertia": 5.5}
+    assert contending(monkeypatch, left) == [*list(left)[:3], "viscous-friction"]
+
+
+def test_far_behind_what_is_known_to_be_reached_nothing_but_the_nearest_is_settled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As far behind the first it is else: the first may not be what it will be."""
+    left = {"cogging": 1.0, "position-force": 2.0, "drive-gain": 20.0}
+    assert contending(monkeypatch, left) == [*left]
+    assert contending(monkeypatch, left, known=0.9) == [*left]
+    assert contending(monkeypatch, left, known=0.7) == [*list(left)[:2]]
+    assert contending(monkeypatch, left, known=1e-3) == [*list(left)[:2]]
 
 
 def test_viscous_friction_is_not_looked_for_beside_one_that_differs_by_direction() -> None:

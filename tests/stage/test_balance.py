@@ -14,6 +14,7 @@ from rtcomp.stage.balance import (
     force_balance,
     forces,
     known_force,
+    parts_of_drive,
     zero_phase,
 )
 from rtcomp.stage.simulate import Simulator
@@ -176,3 +177,24 @@ def test_friction_that_falls_with_speed_is_not_late_where_rows_are_long(lag, fol
     late = np.interp(rows - 0.5, rows, fine)
     sliding = (np.abs(np.sin(8e-3 * np.pi * rows)) < 0.5) & (rows > 200)  # what changes is the level
     assert np.std((coarse - fine)[sliding]) < 0.1 * np.std((late - fine)[sliding])
+
+
+@pytest.mark.parametrize("speed", [1e-3, 1e-2, 3e-2])
+def test_the_force_of_a_ripple_over_a_row_is_its_mean(speed):
+    """At 30 mm/s a row is a third of the period; the push beside it is the one at the row."""
+    row, count, period = 1e-3, 200, 1e-4
+    effects = [
+        {"name": "torque-ripple", "amplitude": 0.3, "period": period, "phase": 0.4},
+        {"name": "cogging", "amplitude": 0.5, "period": period, "phase": -1.0},
+    ]
+    chain = [*(e for e in QUIET.chain if e.name == "drive-force"), *(physics.build(e) for e in effects)]
+    chain.sort(key=lambda e: e.order)
+    time = row * np.arange(count)
+    x, still, ones = speed * time, np.zeros(count), np.ones(count)
+    found = forces(QUIET, chain, time, x, speed * ones, still, ones, parts=parts_of_drive(chain))
+    angle = 2.0 * np.pi * x / period
+    mean = 1.0 - 0.3 * period / (2.0 * np.pi * speed * row) * np.diff(np.cos(angle + 0.4))
+    np.testing.assert_allclose(
+        found.drive[1:] / QUIET.force_constant, mean, atol=0.3 * 0.01 * (speed / 3e-2) ** 2
+    )
+    np.testing.assert_allclose(found.push, 0.5 * np.sin(angle - 1.0), atol=1e-9)
