@@ -233,7 +233,7 @@ def around_rows(force: Floats) -> Floats:
     a force that is smooth between rows is (F[k-1] + 10 F[k] + F[k+1]) / 12 (Numerov 1924), right to the
     fourth order. At a tenth of the rate the middle value alone would be 3 % too large.
     """
-    mean = np.array(force)
+    mean = np.array(force, order="C")
     _around(mean.reshape(mean.shape[0], -1))
     return mean
 

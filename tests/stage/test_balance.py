@@ -10,6 +10,7 @@ import pytest
 from rtcomp import physics
 from rtcomp.stage.balance import (
     PARTS,
+    around_rows,
     bandwidth,
     force_balance,
     forces,
@@ -198,3 +199,13 @@ def test_the_force_of_a_ripple_over_a_row_is_its_mean(speed):
         found.drive[1:] / QUIET.force_constant, mean, atol=0.3 * 0.01 * (speed / 3e-2) ** 2
     )
     np.testing.assert_allclose(found.push, 0.5 * np.sin(angle - 1.0), atol=1e-9)
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_forces_around_rows_are_weighed_one_ten_one(order):
+    force = np.asarray(np.random.default_rng(3).standard_normal((50, 3)), order=order)
+    before = force.copy()
+    found = around_rows(force)
+    assert np.array_equal(force, before) and np.array_equal(found[[0, -1]], force[[0, -1]])
+    np.testing.assert_allclose(found[1:-1], (force[:-2] + 10.0 * force[1:-1] + force[2:]) / 12.0, rtol=1e-14)
+    assert np.array_equal(around_rows(np.ascontiguousarray(force[:, 1])), found[:, 1])
