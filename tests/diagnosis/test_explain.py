@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+from recorded import STAGE, cut, run, stage
 
+from rtcomp.control.references import Reference
 from rtcomp.diagnosis.diagnose import diagnose
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
@@ -24,3 +27,19 @@ def test_a_play_and_ageing_behind_it_are_named_though_their_kernels_leave_ten_ti
     done = diagnose(config.stage, [Recording(columns, 1000.0)])
     assert {e.names[0] for e in done.effects} == {"backlash", "stiction-ageing"}
     assert done.fit.after < 0.3 * done.fit.retuned
+
+
+def test_contacts_that_were_loaded_before_the_recording_hide_no_dead_band() -> None:
+    """It begins with small motion, as a multisine that fades in does, on an axis that came from elsewhere."""
+    weightless = [{"stiffness": 1e-13, "reach": reach} for reach in (4.5e-5, 5e-5)]
+    friction = [*STAGE["stage"]["friction"], {"stiffness": 1e4, "reach": 4e-5}]
+    true = stage(friction=friction, effects=[{"name": "drive-deadband", "width": 0.4}])
+    band = {"low": 0.11, "high": 2.2, "count": 7}
+    searching = {"kind": "multisine", "band": band, "amplitude": 2.6e-4, "duration": 23.0}
+    came = 2e-4 * np.sin(np.linspace(0.0, 0.8 * np.pi, 1500))
+    then = Reference.from_dict(searching).evaluate(np.arange(23_000) * 1e-3)[0]
+    recording = cut(run(true, np.concatenate([came, came[-1] + then])), 1500, 24_500)
+    done = diagnose(stage(friction=[*friction, *weightless]), [recording])
+    assert [e.names for e in done.effects] == [("drive-deadband",)]
+    print(done.fit)
+    assert done.fit.after < 0.1 * done.fit.retuned
