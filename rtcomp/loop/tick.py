@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtcomp.hysteresis.basis import Basis
+from rtcomp.hysteresis.basis import Basis, regressors
 from rtcomp.hysteresis.conditioning import memory
 from rtcomp.hysteresis.learner import Learner, followed
 from rtcomp.hysteresis.moving.places import CHANGE_WIDTH, MOVES
@@ -179,6 +179,10 @@ class Tick:
     def updates(self) -> int:
         """How often the weights were changed."""
         return int(self.state[at.UPDATES])
+
+    def remember(self, positions: Floats) -> None:
+        """Take the memory of what is fed forward along `positions` (m), one a tick, of before the run."""
+        regressors(self.basis, positions, self.compensator.bs, self.compensator.x[: self.basis.size])
 
     def adopt_weights(self, weights: Floats, memory: Floats | None = None) -> None:
         """Take weights (size of basis + 1) as the start, to which a diverged identifier goes back.

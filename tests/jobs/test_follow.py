@@ -23,11 +23,10 @@ def test_an_asymmetric_axis_is_followed_from_where_relaxing_left_it(leuven, tmp_
         )
         run = follow(config, "compensate", stage=plant, feedforward_from=0.0, path=tmp_path / "run.h5")
     c = run.columns
-    assert c["reference"][0] != 0.0 and abs(c["position"][:20] - c["reference"][0]).max() < 2e-7
-    assert abs(c["feedforward"][0]) < 0.1, "let go, it holds no force"
-    off = np.median(np.abs(c["position"] - c["reference"])[500:])
-    print(off)
-    assert off < 3e-7
+    assert c["reference"][0] != 0.0 and abs(c["position"][:20] - c["reference"][0]).max() < 2e-6
+    assert abs(c["feedforward"][0]) < 0.2, "let go, it holds no force: at once it was 0.5 V"
+    # 0.03 um; as if virgin, or let go at once, 0.2 to 0.7.
+    assert np.median(np.abs(c["position"] - c["reference"])[500:]) < 1.2e-7
 
 
 def test_without_a_past_there_is_no_relaxing(leuven):

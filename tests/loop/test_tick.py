@@ -22,6 +22,7 @@ from loop_rig import (
 from rtcomp.control.limits import limit_state, limit_step, limit_vector
 from rtcomp.control.pid import pid_state, pid_step, pid_vector
 from rtcomp.errors import LimitError
+from rtcomp.hysteresis.basis import regressors
 from rtcomp.hysteresis.conditioning import low_pass, memory, settle, smooth
 from rtcomp.hysteresis.interval import IntervalBasis
 from rtcomp.hysteresis.lms import Lms
@@ -162,6 +163,19 @@ def test_feedforward_fades_in_without_a_jump():
     assert error[900:].max() < 0.2 * error[:600].max()
     steps = np.abs(np.diff(left.column("voltage")))
     assert steps[595:805].max() < 2 * steps[300:595].max()
+
+
+def test_what_was_followed_before_the_run_is_remembered():
+    """Two pieces of one motion are fed forward as the whole is."""
+    before = 4e-5 * np.sin(0.02 * np.arange(700))
+    the_plan, the_tick = plan(300, learn=False, share=1.0), tick(weights=np.append(WEIGHTS, 0.0))
+    the_tick.remember(before)
+    found = go(device(stage()), the_tick, the_plan).column("feedforward")
+    basis = IntervalBasis(WIDTHS)
+    whole = regressors(basis, np.concatenate([before, the_plan.table[:, LEAD_POSITION]]))[700:] @ WEIGHTS
+    assert np.allclose(found, (the_plan.table[:, LEAD_FORCE] + whole) / CONSTANT, rtol=0, atol=1e-12)
+    virgin = go(device(stage()), tick(weights=np.append(WEIGHTS, 0.0)), plan(300, learn=False, share=1.0))
+    assert np.abs(found - virgin.column("feedforward")).max() > 0.1
 
 
 def test_an_axis_that_is_let_go_comes_to_rest_without_a_swing():
