@@ -147,7 +147,7 @@ def test_a_line_with_a_few_damaged_frames_is_ridden_out(pty_board):
 
     def damage(data):
         damaged = bytearray(data)
-        if noise.random() < 0.04:
+        if noise.random() < 0.02:
             damaged[noise.randrange(len(damaged))] ^= 1 << noise.randrange(8)
         return bytes(damaged)
 
