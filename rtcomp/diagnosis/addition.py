@@ -183,7 +183,8 @@ def _settle_contenders(
 ) -> None:
     """Replace the best of `tried`, best first, by what they are on reaches of their own, in the best form.
 
-    A base that has bent to an effect is no fair ground for its name. `also` has other forms by name.
+    A base that has bent to an effect is no fair ground for its name. `also` has other forms by name, and
+    `known` is a squared error (N^2) known to be reached, 0 where none is.
     """
     whole, first = float(current.errors.sum()), float(tried[0].errors.sum())
     left = [float(r.errors.sum()) for r in tried]

@@ -15,10 +15,7 @@ SINE = {"kind": "sine", "amplitude": 5e-5, "frequency": 2.0, "duration": 1.0}
 
 
 def way(end: float, between: float) -> FollowingOn:
-    now = Reference.from_dict(
-        {"kind": "sine", "amplitude": 5e-5, "frequency": 2.0, "duration": 1.0}, start=end
-    )
-    return FollowingOn(Reference.from_dict(REVERSALS), now, between)
+    return FollowingOn(Reference.from_dict(REVERSALS), Reference.from_dict(SINE, start=end), between)
 
 
 @given(st.floats(-4e-5, 4e-5), st.floats(0.02, 0.5))

@@ -41,5 +41,4 @@ def test_contacts_that_were_loaded_before_the_recording_hide_no_dead_band() -> N
     recording = cut(run(true, np.concatenate([came, came[-1] + then])), 1500, 24_500)
     done = diagnose(stage(friction=[*friction, *weightless]), [recording])
     assert [e.names for e in done.effects] == [("drive-deadband",)]
-    print(done.fit)
     assert done.fit.after < 0.1 * done.fit.retuned

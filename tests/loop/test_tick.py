@@ -188,7 +188,6 @@ def test_an_axis_that_is_let_go_comes_to_rest_without_a_swing():
     volts, position = left.column("voltage"), left.column("position")
     assert abs(volts[1999]) > 0.1 and not volts[2301:].any()
     back = np.abs(position[2000:] - position[1999])
-    print(back.max(), back[-1], volts[1999])
     assert back[-1] > 3e-7 and back.max() < 1.05 * back[-1]
 
 
