@@ -21,6 +21,8 @@ from rtcomp.diagnosis.extend import level_and_reach
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Knob, Refined, refine
 from rtcomp.diagnosis.result import Retuned, Value
+from rtcomp.diagnosis.scene import Scene
+from rtcomp.diagnosis.typical import typical
 from rtcomp.kernels import Floats
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.stage.stage import Stage
@@ -37,6 +39,8 @@ AT_BOUND = 0.002
 """Relative distance from the furthest that may be believed, within which the belief holds a number there."""
 SEVERAL = 3
 """Numbers that must have moved for it to be said that all did."""
+SECOND = (("parallel-spring", "cubic"), ("position-dependent-friction", "slope"))
+"""Entries, and numbers by which they act beside their size."""
 FREEDOM, WIDE = 9, 2.262
 """Degrees of freedom of about ten blocks, and standard deviations of a 95 % interval from them (Student)."""
 
@@ -144,6 +148,22 @@ def intervals(
         low, high = knob.parameter.low, knob.parameter.high  # what it may be at all
         found[knob.entry, knob.parameter.name] = (max(value - half, low), min(value + half, high))
     return found
+
+
+def may_be_nothing(refined: Refined) -> bool:
+    """Tell whether the 95 % interval of the last entry's size holds what would change nothing.
+
+    An entry that acts by a second number too has that interval to pass as well.
+    """
+    scene, at = Scene.of(refined.fitted.ledger.motion, refined.fitted), len(refined.entries) - 1
+    like = next((one for one in typical(scene, 0.0) if one.name == refined.entries[at]["name"]), None)
+    if like is None:
+        return False
+    spans = intervals(refined, [])
+    neutral = [(like.size, like.neutral)]
+    neutral += [(number, 0.0) for name, number in SECOND if name == like.name]
+    held = [spans[at, size][0] <= none <= spans[at, size][1] for size, none in neutral if (at, size) in spans]
+    return bool(held) and all(held)
 
 
 def _apart(knob: Knob, one: float, other: float) -> float:

@@ -10,6 +10,7 @@ from rtcomp.diagnosis.accept import ABOVE_FLOOR, DISTINCT, MAINLY
 from rtcomp.diagnosis.addition import Progress
 from rtcomp.diagnosis.alike import SHAPELESS
 from rtcomp.diagnosis.base import Fitted
+from rtcomp.diagnosis.certain import may_be_nothing
 from rtcomp.diagnosis.decide import Choice, Decision, decide
 from rtcomp.diagnosis.departure import departure
 from rtcomp.diagnosis.double import Double
@@ -106,6 +107,8 @@ def explain(
         if faint or decision.faint:
             # Where the level shows nothing, whatever else is in one block is as large as the name.
             little = typical > CONFIRMED and (little or fit.after > CONFIRMED * fit.retuned)
+            # Nor is a name shown by a few chances alike, as readings are at reversals.
+            little |= may_be_nothing(decision.refined)
         once = any(e["name"] == "sensor-jump" for e in named)
         if named:
             good = holds(fit, typical, once) and not (strays or little)
