@@ -15,6 +15,7 @@ from rtcomp.diagnosis.certain import (
     all_by_one_factor,
     covariance,
     force_constant,
+    may_be_nothing,
     retunings,
     scatter,
     widening,
@@ -154,3 +155,28 @@ def test_a_force_constant_that_is_another_is_told_as_such_and_moves_alike() -> N
     assert done.stage.force_constant == pytest.approx(true.force_constant, rel=0.02)
     assert done.stage.mass == pytest.approx(believed.mass, rel=0.03)
     assert done.fit.after < 0.2 * done.fit.before
+
+
+SPRING = {"name": "parallel-spring", "stiffness": 1.0, "cubic": 0.0}
+BENT = {"name": "parallel-spring", "stiffness": 0.0, "cubic": 4e10}
+AGEING = {"name": "stiction-ageing", "growth": 0.01, "distance": 1e-6, "onset": 0.05}
+STRIBECK = {"name": "stribeck", "rise": 0.3, "velocity": 2e-4}
+
+
+@pytest.mark.parametrize(
+    ("hidden", "tried", "nothing"),
+    [
+        ([], SPRING, True),
+        ([], AGEING, True),
+        ([SPRING | {"stiffness": 800.0}], SPRING, False),
+        ([BENT], SPRING | {"cubic": 1e9}, False),
+        ([STRIBECK], STRIBECK | {"rise": 0.1}, False),
+    ],
+)
+def test_what_is_not_there_may_be_nothing_by_its_own_interval(
+    hidden: list[dict[str, object]], tried: dict[str, object], nothing: bool
+) -> None:
+    believed = axis()
+    motion = prepare(believed, [run(axis(effects=hidden), there_and_back(8.0))])
+    refined = refine(fit_base(believed, motion), motion, [dict(tried)])
+    assert may_be_nothing(refined) is nothing

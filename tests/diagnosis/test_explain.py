@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from recorded import STAGE, cut, run, stage
@@ -11,7 +13,11 @@ from rtcomp.diagnosis.diagnose import diagnose
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
 from rtcomp.jobs.simulate import closed_loop
-from rtcomp.recording.reader import Recording
+from rtcomp.recording.reader import Recording, read
+from rtcomp.stage.stage import Stage
+from rtcomp.trial.draw import Plan, draw
+from rtcomp.trial.stagefile import write_recording
+from rtcomp.yamlfile import dump_yaml
 
 
 @pytest.mark.slow
@@ -42,3 +48,14 @@ def test_contacts_that_were_loaded_before_the_recording_hide_no_dead_band() -> N
     done = diagnose(stage(friction=[*friction, *weightless]), [recording])
     assert [e.names for e in done.effects] == [("drive-deadband",)]
     assert done.fit.after < 0.1 * done.fit.retuned
+
+
+@pytest.mark.slow
+def test_rests_that_begin_with_readings_half_a_count_off_are_no_ageing(tmp_path: Path) -> None:
+    """Friction gives way over 78 counts. Ageing takes four tenths of the error off, and may be none."""
+    case = draw(Plan("case", "clean", (), "full", 1292388983252871617))
+    dump_yaml(tmp_path / "stage.yaml", case.believed)
+    write_recording(tmp_path / "train.csv.gz", case.run("train"), case.loop.resolution)
+    done = diagnose(Stage.load(tmp_path / "stage.yaml"), [read(tmp_path / "train.csv.gz")])
+    assert done.verdict == "consistent"
+    assert not done.effects
