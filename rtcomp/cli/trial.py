@@ -24,8 +24,13 @@ if TYPE_CHECKING:
 @click.option("--cases", type=click.IntRange(1, 100_000), default=40, show_default=True, help="How many.")
 @click.option("--seed", type=click.IntRange(0, 2**62), default=0, show_default=True, help="What is drawn.")
 @click.option(
+    "--only",
+    type=click.Choice(["one", "two", "outside", "clean", "retuned"]),
+    help="Cases of this kind and no others: false alarms of one in a hundred take hundreds of clean ones.",
+)
+@click.option(
     "--resume", metavar="DIR", type=click.Path(path_type=Path),
-    help="Go on with a trial that was stopped: where it was kept. Its cases and seed count.",
+    help="Go on with a trial that was stopped: where it was kept. Its cases, seed and kind count.",
 )  # fmt: skip
 @output_options("out/trial")
 @click.option("--jobs", type=click.IntRange(1, 1024), help="Processes at a time; default one a core.")
@@ -42,6 +47,7 @@ if TYPE_CHECKING:
 def trial(
     cases: int,
     seed: int,
+    only: str | None,
     resume: Path | None,
     out: Path,
     force: bool,
@@ -74,9 +80,9 @@ def trial(
     chosen = tuple(RIVALS) if rivals == "all" else ()
     if resume is not None:
         so_far = Stopped.read(resume)
-        cases, seed = so_far.cases, so_far.seed
+        cases, seed, only = so_far.cases, so_far.seed, so_far.only
     settings = Settings(
-        cases, seed, jobs or os.cpu_count() or 1, diagnose, (*here, "replay"), timeout, chosen
+        cases, seed, jobs or os.cpu_count() or 1, diagnose, (*here, "replay"), timeout, chosen, only
     )
     with prepare_output(out, force) as work, Progress("trial", quiet=as_json) as bar:
         done = run(

@@ -49,13 +49,18 @@ class Plan:
     seed: int
 
 
-def plan(cases: int, seed: int) -> list[Plan]:
-    """Return what each of `cases` hides: every kind where there are five or more, effects in turn."""
+def plan(cases: int, seed: int, only: str | None = None) -> list[Plan]:
+    """Return what each of `cases` hides: every kind where there are five or more, effects in turn.
+
+    With `only`, one of `SHARES`, all are of that kind: what is rare takes many to see.
+    """
     chance = np.random.default_rng(seed)
     counts = {kind: int(share * cases) for kind, share in SHARES.items()}
     if cases >= len(counts):
         counts = {kind: max(1, count) for kind, count in counts.items()}
     counts["one"] += cases - sum(counts.values())
+    if only is not None:
+        counts = {only: cases}
     effects, pairs = _in_turn(chance, EFFECTS), _in_turn(chance, EFFECTS)
     outside, retuned = _in_turn(chance, OUTSIDE), _in_turn(chance, RETUNED)
     drawn: list[tuple[str, tuple[str, ...]]] = []

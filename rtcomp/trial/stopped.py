@@ -25,6 +25,8 @@ class Stopped:
     cases: int
     seed: int
     seconds: float = 0.0
+    only: str | None = None
+    """The kind that all cases are of; None for all kinds."""
     salts: dict[str, str] = field(default_factory=dict)
     """Hexadecimal, by case; empty where the trial was stopped before it had sealed."""
     ended: dict[str, dict[str, Outcome]] = field(default_factory=dict)

@@ -48,6 +48,8 @@ class Settings:
     replay: tuple[str, ...]
     timeout_s: float = 900.0
     rivals: tuple[str, ...] = tuple(RIVALS)
+    only: str | None = None
+    """The kind that all cases are of; None for all kinds."""
 
 
 Progress = Callable[[str, int, int], None]
@@ -71,6 +73,7 @@ class Trial:
             "version": __version__,
             "cases": settings.cases,
             "seed": settings.seed,
+            "only": settings.only,
             "seconds": self.seconds,
             "figures": [f.to_json() for f in self.figures],
             "smallest_seen": [
@@ -96,7 +99,7 @@ def trial(
     `earlier`, goes on from: what was diagnosed is not diagnosed again.
     """
     started = time.perf_counter()
-    so_far = Stopped.read(earlier) if earlier else Stopped(settings.cases, settings.seed)
+    so_far = Stopped.read(earlier) if earlier else Stopped(settings.cases, settings.seed, only=settings.only)
     before = so_far.seconds
     try:
         sealed = _sealed(settings, out, progress, so_far, earlier)
@@ -123,7 +126,7 @@ def _sealed(
     """Draw all cases, write what the diagnoses get, and commit to the answers (or check them, if gone on)."""
     if earlier is not None:  # first of all: who stops it again finds here what was found there
         so_far.bring(earlier, out)
-    plans = plan(settings.cases, settings.seed)
+    plans = plan(settings.cases, settings.seed, settings.only)
     answers = {}
     with ProcessPoolExecutor(settings.jobs) as pool:
         for case in pool.map(_make, plans, [out] * len(plans)):

@@ -75,6 +75,25 @@ def test_a_diagnosis_that_fails_is_scored_as_failed(how: str, says: str, tmp_pat
     assert not (out / "cases").exists()
 
 
+def test_a_trial_of_clean_cases_only_scores_false_alarms_and_nothing_else(tmp_path: Path) -> None:
+    run = trial(
+        tmp_path / "trial", "--cases", 2, "--only", "clean", "--rivals", "none", "--json", how="cogging"
+    )
+    assert run.returncode == 0, run.stderr
+    content = json.loads(run.stdout)
+    assert content["only"] == "clean"
+    assert [row["kind"] for row in content["rows"]] == ["clean", "clean"]
+    figures = {f["name"]: f for f in content["figures"]}
+    assert (figures["false alarm on clean"]["value"], figures["false alarm on clean"]["count"]) == (1.0, 2)
+    assert figures["named first, one effect"]["count"] == figures["outside misnamed"]["count"] == 0
+
+
+def test_a_kind_that_there_is_not_is_refused(tmp_path: Path) -> None:
+    run = trial(tmp_path / "trial", "--only", "dirty", how="cogging")
+    assert run.returncode == 2 and all(kind in run.stderr for kind in SHARES)
+    assert not (tmp_path / "trial").exists()
+
+
 def test_a_diagnosis_that_never_ends_is_ended(tmp_path: Path) -> None:
     out = tmp_path / "trial"
     run = trial(out, "--cases", 1, "--rivals", "none", "--timeout", 2, "--keep", how="sleep")
@@ -89,6 +108,7 @@ def stopped(out: Path, number: int = signal.SIGTERM) -> Path:
     """Stop a trial of three cases when the first is answered; return where it was kept."""
     stand_in = f"{sys.executable} {STAND_IN} once"
     command = [*RTCOMP, "trial", "--out", str(out), "--jobs", "1", "--cases", "3", "--seed", "5"]
+    command += ["--only", "clean"]
     command += ["--rivals", "none", "--diagnose", stand_in]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as run:
         until = time.monotonic() + 200.0
@@ -114,7 +134,8 @@ def test_a_trial_that_was_stopped_goes_on(tmp_path: Path) -> None:
     run = trial(out, "--resume", kept, "--rivals", "none", how="cogging")
     assert run.returncode == 0, run.stderr
     content = checked(out, 3)
-    assert (content["seed"], content["cases"]) == (5, 3)
+    assert (content["seed"], content["cases"], content["only"]) == (5, 3, "clean")
+    assert {row["kind"] for row in content["rows"]} == {"clean"}  # type: ignore[attr-defined]
     assert (out / "commitments.json").read_text() == published
     verdicts = {row["case"]: row["verdict"] for row in content["rows"]}  # type: ignore[attr-defined]
     assert verdicts.pop(done[0].parent.name) == "unexplained"
@@ -175,6 +196,9 @@ def test_a_large_trial_hides_every_effect_in_the_parts_promised() -> None:
     assert {s for p in plans if p.kind == "one" for s in p.secrets} == {e.name for e in EFFECTS}
     assert 0.1 < sum(p.tier == "weak" for p in plans) / 300 < 0.35
     assert len({p.name for p in plans}) == 300
+    for kind in SHARES:
+        assert {p.kind for p in plan(20, 1, kind)} == {kind}
+    assert len({p.seed for p in plan(20, 1, "clean")}) == 20
 
 
 @pytest.mark.slow
