@@ -12,6 +12,7 @@ import os
 import select
 import signal
 import sys
+import threading
 import traceback
 from collections.abc import Sequence
 from types import FrameType
@@ -24,6 +25,9 @@ from rtcomp.cli.lazy import LazyGroup
 from rtcomp.errors import Interrupted, RtcompError
 
 INTERNAL, INTERRUPTED, BROKEN_PIPE = 70, 130, 141
+
+AGAIN_S = 0.02
+"""After which a signal that was dropped is sent again."""
 
 COMMANDS = {
     "demo": ("rtcomp.cli.demo:demo", "Identify and compensate a simulated stage, to the report."),
@@ -59,6 +63,7 @@ def cli() -> None:
 def main() -> None:
     """Run the command line of this process and exit with its status."""
     signal.signal(signal.SIGTERM, _terminated)
+    sys.unraisablehook = _dropped
     # Matrices are small here: threads for them cost more than they give, and take cores from loop and search.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
@@ -71,6 +76,19 @@ def _terminated(number: int, _frame: FrameType | None) -> None:
     # Once: what it sets off, such as keeping what was written, is not to be cut short by a second one.
     signal.signal(number, signal.SIG_IGN)
     raise Interrupted(number)
+
+
+def _dropped(what: sys.UnraisableHookArgs) -> None:
+    """Send a signal again that came where Python drops what is raised (a finaliser, a hook of fork)."""
+    error = what.exc_value
+    if not isinstance(error, KeyboardInterrupt):
+        sys.__unraisablehook__(what)
+        return
+    if isinstance(error, Interrupted):
+        signal.signal(error.number, _terminated)
+    number = error.number if isinstance(error, Interrupted) else signal.SIGINT
+    # In a moment: raised here, it would be dropped as well.
+    threading.Timer(AGAIN_S, signal.pthread_kill, (threading.main_thread().ident, number)).start()
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -155,7 +173,7 @@ def _notes(error: BaseException) -> list[str]:
 
 
 def _with_notes(error: BaseException) -> str:
-    return "; ".join([str(error), *_notes(error)])
+    return "; ".join(filter(None, [str(error), *_notes(error)]))
 
 
 def _say(message: str, status: int, prefix: str = "error: ") -> int:

@@ -11,7 +11,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -128,10 +128,14 @@ def _sealed(
         so_far.bring(earlier, out)
     plans = plan(settings.cases, settings.seed, settings.only)
     answers = {}
-    with ProcessPoolExecutor(settings.jobs) as pool:
+    # Threads: a signal that comes while a process is forked is lost there, or leaves a pool that never ends.
+    pool = ThreadPoolExecutor(settings.jobs)
+    try:
         for case in pool.map(_make, plans, [out] * len(plans)):
             answers[case.plan.name] = case.answer()
             progress("draw", len(answers), len(plans))
+    finally:
+        pool.shutdown(cancel_futures=True)  # who stops it waits for the cases at hand, not for all
     sealed = Sealed(answers, so_far.salts)
     if earlier is not None:
         sealed.check(out / "commitments.json")

@@ -42,7 +42,8 @@ from rtcomp import errors
 class Module: probe = staticmethod(click.command()(body))
 sys.modules["probe_module"] = Module
 main.cli.table["probe"] = ("probe_module:probe", "A probe.")
-sys.exit(main.run(["probe"]))
+sys.argv = ["rtcomp", "probe"]
+main.main()
 """
     return subprocess.Popen(
         [sys.executable, "-c", program],
@@ -162,6 +163,23 @@ def test_a_reader_that_goes_away_ends_it_quietly() -> None:
 def test_an_interrupt_from_the_keyboard_is_one_line() -> None:
     source = "import os, signal, time\ndef body():\n  os.kill(os.getpid(), signal.SIGINT)\n  time.sleep(30)\n"
     assert run_python(source) == (128 + signal.SIGINT, "", "interrupted\n")
+
+
+DROPPED = """import os, signal, time
+class Late:
+    def __del__(self):
+        os.kill(os.getpid(), signal.{name})
+        time.sleep(0.01)  # what the handler raises is raised in here, and Python drops it
+def body():
+    Late()
+    for _ in range(3000):
+        time.sleep(0.01)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_that_python_drops_is_not_lost(number: signal.Signals) -> None:
+    assert run_python(DROPPED.format(name=number.name)) == (128 + number, "", "interrupted\n")
 
 
 @pytest.mark.parametrize("name", COMMANDS)

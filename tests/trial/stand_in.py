@@ -39,6 +39,7 @@ assert not any(trial.rglob("stopped.json"))
 if how == "once":  # answers the first case that it is given, and never any other
     before = (trial / "diagnoses").glob("*/diagnosis.json")
     if any(before):
+        time.sleep(0.3)  # until the trial has surely taken the first one down
         (trial / "waits").touch()
         time.sleep(600)
 

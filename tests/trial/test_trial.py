@@ -104,6 +104,18 @@ def test_a_diagnosis_that_never_ends_is_ended(tmp_path: Path) -> None:
         assert not stat.exists() or stat.read_text().rsplit(")", 1)[1].split()[0] == "Z"
 
 
+def ended(run: subprocess.Popen[str], number: int) -> str:
+    """Send a signal; return what was said on standard error until the end that it is to bring."""
+    run.send_signal(number)
+    try:
+        _, said = run.communicate(timeout=60.0)
+    except subprocess.TimeoutExpired:
+        run.kill()
+        raise
+    assert run.returncode == 128 + number, said
+    return said
+
+
 def stopped(out: Path, number: int = signal.SIGTERM) -> Path:
     """Stop a trial of three cases when the first is answered; return where it was kept."""
     stand_in = f"{sys.executable} {STAND_IN} once"
@@ -114,11 +126,15 @@ def stopped(out: Path, number: int = signal.SIGTERM) -> Path:
         until = time.monotonic() + 200.0
         while not (out / "waits").exists() and time.monotonic() < until and run.poll() is None:
             time.sleep(0.05)
-        run.send_signal(number)
-        _, said = run.communicate(timeout=60.0)
+        said = ended(run, number)
     kept = out.with_name(f"{out.name}.failed")
-    assert run.returncode == 128 + number and str(kept) in said, said
+    assert str(kept) in said
     return kept
+
+
+@pytest.fixture(scope="module")
+def stopped_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return stopped(tmp_path_factory.mktemp("stopped") / "trial")
 
 
 @pytest.mark.slow
@@ -147,8 +163,12 @@ def test_a_trial_that_was_stopped_goes_on(tmp_path: Path) -> None:
     assert run.returncode == 2 and "does not come out as it was committed to" in run.stderr
 
 
-def test_a_trial_that_is_stopped_again_while_drawing_loses_nothing(tmp_path: Path) -> None:
-    kept, out = stopped(tmp_path / "trial"), tmp_path / "again"
+@pytest.mark.parametrize("after", [0.0, 0.01, 0.03, 0.1, 0.3])
+def test_a_trial_that_is_stopped_again_loses_nothing(
+    after: float, stopped_once: Path, tmp_path: Path
+) -> None:
+    """From when all answers are taken over: drawing starts then, and takes about half a second."""
+    kept, out = stopped_once, tmp_path / "again"
     answered = [p.parent.name for p in (kept / "diagnoses").glob("*/diagnosis.json")]
     command = [*RTCOMP, "trial", "--out", str(out), "--resume", str(kept), "--rivals", "none"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as run:
@@ -156,11 +176,11 @@ def test_a_trial_that_is_stopped_again_while_drawing_loses_nothing(tmp_path: Pat
         # Fast machines stop with two of them.
         taken = [out / "diagnoses" / f"{name}.log" for name in answered]
         while not all(log.exists() for log in taken) and time.monotonic() < until:
-            time.sleep(0.02)
-        assert not any((out / "cases").glob("*/train.csv.gz"))
-        run.send_signal(signal.SIGTERM)
-        run.communicate(timeout=60.0)
+            time.sleep(0.001)
+        time.sleep(after)
+        said = ended(run, signal.SIGTERM)
     again = out.with_name("again.failed")
+    assert said == f"interrupted; what was written until then is kept in {again}\n"
     found = [p.parent.name for p in (again / "diagnoses").glob("*/diagnosis.json")]
     assert sorted(found) == sorted(answered)
     assert json.loads((again / "stopped.json").read_text())["salts"]
