@@ -12,7 +12,8 @@ import sys
 from pathlib import Path
 
 import click
-from fault_rows import CONFIG, ROWS, variant
+from fault_rows import ROWS
+from fault_run import CONFIG, variant
 from rich import box
 from rich.console import Console
 from rich.table import Table

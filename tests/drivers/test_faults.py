@@ -8,8 +8,10 @@ import sys
 from pathlib import Path
 
 import fault_rows
+import fault_run
 import pytest
-from fault_rows import ROWS, Row, variant
+from fault_rows import ROWS, Row
+from fault_run import variant
 from rtcomp_drivers.faults import KINDS, Fault, FaultyDevice
 
 from rtcomp.jobs.configuration import Configuration
@@ -40,19 +42,15 @@ def test_the_table_sees_a_check_that_is_missing(
     name: str, off: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With one limit taken away, or another in its place, the same variants fail."""
-    config: Configuration = fault_rows.CONFIG
+    config: Configuration = fault_run.CONFIG
     limits = {**config.file.data["limits"], **off}
-    monkeypatch.setattr(fault_rows, "CONFIG", config.changed(limits=limits))
+    monkeypatch.setattr(fault_run, "CONFIG", config.changed(limits=limits))
     assert any(variant(BY_NAME[name], seed).problems for seed in range(1000, 1010))
 
 
 def test_every_kind_of_fault_is_in_the_table() -> None:
-    drawn = set()
-    for row in ROWS:
-        source = Path(fault_rows.__file__).read_text()
-        drawn |= {kind for kind in KINDS if f'"{kind}"' in source}
-        assert row.name
-    assert drawn == set(KINDS)
+    source = Path(fault_rows.__file__).read_text()
+    assert [kind for kind in KINDS if f'"{kind}"' not in source] == []
 
 
 def test_what_is_no_fault_is_refused() -> None:
