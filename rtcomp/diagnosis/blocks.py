@@ -83,6 +83,14 @@ class Blocks:
         """Return the coefficients (p,) in the units of the columns, fitted on `use`."""
         return self.solve(use, bounds) / self.scale
 
+    def own_part(self, columns: Floats, which: int) -> Floats:
+        """Return what no other of `columns` (n, p), those that these are of, has of column `which`; (n,)."""
+        gram = self.gram.sum(axis=0)
+        rest = np.arange(self.scale.size) != which
+        inner = gram[np.ix_(rest, rest)] + 1e-9 * np.eye(self.scale.size - 1)
+        part = np.linalg.solve(inner, gram[rest, which]) * self.scale[which] / self.scale[rest]
+        return np.asarray(columns[:, which] - columns[:, rest] @ part)
+
 
 @dataclass(frozen=True)
 class Bounds:

@@ -41,6 +41,8 @@ SEVERAL = 3
 """Numbers that must have moved for it to be said that all did."""
 SECOND = (("parallel-spring", "cubic"), ("position-dependent-friction", "slope"))
 """Entries, and numbers by which they act beside their size."""
+ONCE = 0.5
+"""Part of all that tells a number; leaving out a block that has more of it tells nothing."""
 FREEDOM, WIDE = 9, 2.262
 """Degrees of freedom of about ten blocks, and standard deviations of a 95 % interval from them (Student)."""
 
@@ -76,7 +78,8 @@ def covariance(refined: Refined) -> Floats:
 
     Each block of the recording is left out in turn, the numbers of the base fitted anew beside the knobs
     (delete-a-group jackknife: Bell and McCaffrey 2002, Survey Methodology 28(2)). Residuals that a fit has
-    bent to itself would promise too much: a score of columns takes a good part of twenty blocks up.
+    bent to itself would promise too much: a score of columns takes a good part of twenty blocks up. What a
+    single block tells is compared with the rest of the recording (`elsewhere`).
     """
     fitted, j = refined.fitted, refined.jacobian
     ledger = fitted.ledger
@@ -95,8 +98,25 @@ def covariance(refined: Refined) -> Floats:
         others = every.copy()
         others[k] = False
         without.append(blocks.coefficients(others)[: j.shape[1]])
+    spread = scatter(np.array(without))
+    for k in range(j.shape[1]):
+        own = blocks.own_part(table, k)
+        told = np.bincount(block, own**2, count)
+        if told.max() > ONCE * told.sum():
+            spread[k] = spread[:, k] = 0.0
+            spread[k, k] = elsewhere(own, refined.residual)
     # What is believed of the base's numbers is as good as a measurement of them.
-    return _inverse(_inverse(scatter(np.array(without))) + refined.away.T @ refined.away)
+    return _inverse(_inverse(spread) + refined.away.T @ refined.away)
+
+
+def elsewhere(column: Floats, residual: Floats) -> float:
+    """Return the mean square of the coefficients that `column` (n,) finds along the whole `residual` (n,).
+
+    The variance of the number of what happened once: as large as what a residual that is alike for long makes
+    of it where it did not happen.
+    """
+    found = np.fft.ifft(np.fft.fft(residual) * np.conj(np.fft.fft(column))).real
+    return float(np.mean(found**2)) / float(column @ column) ** 2
 
 
 def _inverse(matrix: Floats) -> Floats:

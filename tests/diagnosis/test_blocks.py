@@ -52,3 +52,11 @@ def test_further_columns_are_added_as_if_they_had_been_there() -> None:
     use = np.ones(6, dtype=bool)
     assert more.coefficients(use) == pytest.approx(whole.coefficients(use), rel=1e-9)
     assert more.left_out(use) == pytest.approx(whole.left_out(use), rel=1e-9)
+
+
+def test_the_part_that_no_other_column_has_is_left_of_one() -> None:
+    a, _, blocks = made(11)
+    for k in range(6):
+        rest = np.delete(a, k, axis=1)
+        expected = a[:, k] - rest @ np.linalg.lstsq(rest, a[:, k], rcond=None)[0]
+        assert blocks.own_part(a, k) == pytest.approx(expected, abs=1e-5 * np.linalg.norm(a[:, k]))

@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 from recorded import run, there_and_back
 from recorded import stage as axis
+from scipy.signal import lfilter
 
 from rtcomp.diagnosis.base import fit_base
 from rtcomp.diagnosis.certain import (
     Numbers,
     all_by_one_factor,
     covariance,
+    elsewhere,
     force_constant,
+    intervals,
     may_be_nothing,
     retunings,
     scatter,
@@ -45,6 +48,31 @@ def test_blocks_like_their_neighbours_count_as_fewer() -> None:
         plain.append(scatter(walk[1:])[0, 0])
         alike.append(scatter((walk[1:] + walk[:-1]) / np.sqrt(2.0))[0, 0])
     assert np.mean(alike) > 1.2 * np.mean(plain)
+
+
+@pytest.mark.parametrize("alike", [0.0, 0.8])
+def test_what_happened_once_is_as_uncertain_as_what_noise_makes_of_it_elsewhere(alike: float) -> None:
+    """As wide as least squares scatters over many noises, white or alike for a few rows."""
+    chance = np.random.default_rng(7)
+    column = np.zeros(4000)
+    column[1500:1540] = np.sin(np.arange(40) / 5.0)
+    told, found = [], []
+    for _ in range(200):
+        noise = lfilter([1.0], [1.0, -alike], chance.standard_normal(column.size))
+        told.append(elsewhere(column, noise))
+        found.append(column @ noise / (column @ column))
+    assert np.mean(told) == pytest.approx(np.var(found), rel=0.25)
+    if alike == 0.0:
+        assert np.mean(told) == pytest.approx(1.0 / (column @ column), rel=0.05)
+
+
+def test_a_jump_is_as_certain_as_the_moment_tells_it() -> None:
+    """One block holds it: leaving that out tells nothing, and was said to leave half of its size open."""
+    jump = {"name": "sensor-jump", "time": 4.0125, "size": 2e-5}
+    believed = axis()
+    motion = prepare(believed, [run(axis(effects=[jump]), there_and_back(8.0))])
+    low, high = intervals(refine(fit_base(believed, motion), motion, [dict(jump)]), [])[0, "size"]
+    assert low < 2e-5 < high and high - low < 0.08 * 2e-5
 
 
 def test_numbers_told_because_they_moved_have_wider_intervals() -> None:
