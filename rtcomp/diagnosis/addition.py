@@ -15,6 +15,7 @@ from rtcomp.diagnosis.ledger import WHOLE
 from rtcomp.diagnosis.lengths import beside, takes_along
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Refined, refine
+from rtcomp.diagnosis.renamed import other_side
 from rtcomp.diagnosis.scene import Entry, Scene
 from rtcomp.diagnosis.screen import Screened, screen
 from rtcomp.errors import ConfigError
@@ -127,7 +128,7 @@ def _variants(entry: Entry, stage: Stage) -> list[Entry]:
         return [entry, {**entry, "share": LOAD_SHARE, "contact": CONTACT}]
     if name == "drive-offset":
         # The same force, but beside what changes the drive it is not the same physics.
-        return [entry, _other_side(entry, stage)]
+        return [entry, other_side(entry, stage)]
     return [entry]
 
 
@@ -135,17 +136,8 @@ def _biases(entries: list[Entry], added: Entry, stage: Stage) -> list[list[Entry
     """Return `entries`, and where `added` tells the two apart also with a bias on the drive's other side."""
     if added["name"] not in NOT_IN_PROPORTION:
         return [entries]
-    other = [_other_side(e, stage) for e in entries]
+    other = [other_side(e, stage) for e in entries]
     return [entries, other] if other != entries else [entries]
-
-
-def _other_side(entry: Entry, stage: Stage) -> Entry:
-    """Return an offset of the drive as the force that it makes, and such a force as an offset."""
-    if entry["name"] == "drive-offset":
-        return {"name": "constant-force", "force": float(entry["offset"]) * stage.force_constant}  # type: ignore[arg-type]
-    if entry["name"] == "constant-force":
-        return {"name": "drive-offset", "offset": float(entry["force"]) / stage.force_constant}  # type: ignore[arg-type]
-    return entry
 
 
 def _quickly(current: Fitted, motion: Motion, entries: list[Entry], screened: Screened) -> list[Refined]:

@@ -34,6 +34,7 @@ from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.motion import Motion, prepare
 from rtcomp.diagnosis.notes import known_here, looked_at, or_else
 from rtcomp.diagnosis.refine import Refined, refine
+from rtcomp.diagnosis.renamed import renamed
 from rtcomp.diagnosis.result import (
     Candidate,
     Diagnosis,
@@ -253,7 +254,7 @@ def _tell_apart(
 ) -> Experiment | None:
     first, second = choice.names[0], choice.names[1]
     at = next(i for i, e in enumerate(named) if e["name"] == first)
-    other = _like(named[at], second, stage)
+    other = renamed(named[at], second, stage)
     if other is None:
         return None
     swapped = [*named[:at], other, *named[at + 1 :]]
@@ -266,25 +267,6 @@ def _tell_apart(
         )
     except RtcompError:
         return None
-
-
-def _like(entry: Entry, name: str, stage: Stage) -> Entry | None:
-    """Return the entry of another name that acts alike at first sight; None where there is no such rule."""
-    size = {k: v for k, v in entry.items() if k != "name"}
-    try:
-        if name in ("drive-delay", "sensor-delay") and "delay" in size:
-            return {"name": name, "delay": size["delay"]}
-        if name == "drive-lag" and "delay" in size:
-            return {"name": name, "time_constant": size["delay"]}
-        if name == "drive-offset" and "force" in size:
-            return {"name": name, "offset": float(size["force"]) / stage.force_constant}  # type: ignore[arg-type]
-        if name in ("constant-force", "gravity") and "offset" in size:
-            return {"name": name, "force": float(size["offset"]) * stage.force_constant}  # type: ignore[arg-type]
-        if name == "torque-ripple" and {"period", "phase"} <= set(size):
-            return {"name": name, "amplitude": 0.1, "period": size["period"], "phase": size["phase"]}
-    except (TypeError, ValueError):
-        return None
-    return None
 
 
 def _candidates(decision: Decision, base: Fitted, sights: Sequence[Sight]) -> list[Candidate]:
