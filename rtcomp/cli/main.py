@@ -84,9 +84,10 @@ def _dropped(what: sys.UnraisableHookArgs) -> None:
     if not isinstance(error, KeyboardInterrupt):
         sys.__unraisablehook__(what)
         return
+    number: int = signal.SIGINT
     if isinstance(error, Interrupted):
-        signal.signal(error.number, _terminated)
-    number = error.number if isinstance(error, Interrupted) else signal.SIGINT
+        number = error.number
+        signal.signal(number, _terminated)
     # In a moment: raised here, it would be dropped as well.
     threading.Timer(AGAIN_S, signal.pthread_kill, (threading.main_thread().ident, number)).start()
 
