@@ -76,6 +76,8 @@ class AsymmetricFriction(Effect):
     experiment = "loops of several sizes inside presliding, each repeated"
     example = {"asymmetry": 0.1}
     neutral = {"asymmetry": 0.0}
+    linear = ("asymmetry",)
+    search_grid = {"closing": (0.0, 1.0)}
     order = 40
     states = 1
 
@@ -107,4 +109,6 @@ class NonCongruentFriction(Effect):
     experiment = "equal small reversals started from different forces"
     example = {"softening": 0.3}
     neutral = {"softening": 0.0}
+    linear = ("softening",)
+    whole_friction = True
     order = 80

@@ -104,5 +104,8 @@ class ClosingBranches(Effect):
     experiment = "loops of several sizes inside presliding, each repeated"
     example = {"asymmetry": 0.1}
     neutral = {"asymmetry": 0.0}
+    linear = ("asymmetry",)
+    searchable = False
+    whole_friction = True
     order = 70
     states = TURNS + 2 * DEPTH

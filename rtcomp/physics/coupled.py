@@ -137,6 +137,9 @@ class Resonance(Effect):
     experiment = "a chirp through the resonance, or short accelerations followed by rest"
     example = {"frequency": 30.0, "damping": 0.05, "mass_ratio": 0.3}
     neutral = {"mass_ratio": 0.0}
+    linear = ("mass_ratio",)
+    search_grid = {"damping": (0.01, 0.05, 0.2), "mass_ratio": (0.1, 0.4)}
+    moving_mass = True
     order = 60
     states = 2
 
@@ -202,4 +205,5 @@ class LoadFriction(Effect):
     experiment = "that of backlash"
     example = Backlash.example
     neutral = Backlash.neutral
+    searchable = False
     order = 100

@@ -58,6 +58,7 @@ class Dahl(Effect):
     signature = "one curved branch after every reversal, the same at every speed, with no rise before sliding"
     experiment = "reversals inside and beyond presliding at two very different speeds"
     example = {"stiffness": 1e6, "coulomb": 3.0, "exponent": 1.5}
+    searchable = False
 
     def stiffness(self) -> float:
         """Return the slope just after a reversal out of sliding, 2^i k (N/m)."""

@@ -115,6 +115,7 @@ class DriveDelay(Effect):
     experiment = "a chirp or steps of the command up to five times the bandwidth"
     example = {"delay": 3.3e-3}
     neutral = {"delay": 0.0}
+    linear = ("delay",)
     order = 20
     states = _RING + 2 * HELD
 
@@ -134,5 +135,6 @@ class SensorDelay(Effect):
     experiment = "a chirp of the reference up to five times the bandwidth"
     example = {"delay": 3.3e-3}
     neutral = {"delay": 0.0}
+    linear = ("delay",)
     order = 10
     states = _RING + 2 * HELD

@@ -37,6 +37,8 @@ class ConstantForce(Effect):
     experiment = "the same slow stroke in both directions"
     example = {"force": 1.5}
     neutral = {"force": 0.0}
+    linear = ("force",)
+    bias = True
 
 
 @register
@@ -58,3 +60,4 @@ class TonalDisturbance(Effect):
     experiment = "holding still for longer than ten periods, then slow motion"
     example = {"amplitude": 0.8, "frequency": 23.0}
     neutral = {"amplitude": 0.0}
+    linear = ("amplitude",)

@@ -132,6 +132,9 @@ class DriveOffset(Effect):
     experiment = "the same slow stroke in both directions, and holding still"
     example = {"offset": 0.4}
     neutral = {"offset": 0.0}
+    linear = ("offset",)
+    steady = True
+    bias = True
     order = 10
 
 
@@ -151,6 +154,8 @@ class DriveDeadband(Effect):
     experiment = "slow strokes whose command passes through zero often"
     example = {"width": 0.5}
     neutral = {"width": 0.0}
+    linear = ("width",)
+    steady = True
     order = 30
 
 
@@ -171,6 +176,7 @@ class DriveSaturation(Effect):
     experiment = "fast accelerations that ask for the full voltage"
     example = {"limit": 0.9}
     neutral = {"limit": 1e6}
+    steady = True
     order = 40
 
 
@@ -190,6 +196,7 @@ class DriveLag(Effect):
     experiment = "a chirp or steps of the command up to several times the bandwidth"
     example = {"time_constant": 5e-3}
     neutral = {"time_constant": 0.0}
+    linear = ("time_constant",)
     order = 50
     states = 1
 
@@ -209,6 +216,9 @@ class DriveGain(Effect):
     experiment = "accelerations with and without a known added mass"
     example = {"gain": 1.1}
     neutral = {"gain": 1.0}
+    linear = ("gain",)
+    steady = True
+    stands_for = "force_constant"
     order = 60
 
 
@@ -227,6 +237,7 @@ class TorqueRipple(Effect):
     experiment = "the same stretch at two loads, or accelerating and coasting"
     example = {"amplitude": 0.1, "period": 5e-4, "phase": 0.3}
     neutral = {"amplitude": 0.0}
+    linear = ("amplitude",)
     order = 65
 
 
@@ -243,6 +254,8 @@ class DriveForce(Effect):
     signature = "the force follows the command"
     experiment = "any motion"
     example = {}
+    searchable = False
+    steady = True
     order = FORCE_ORDER
 
 
@@ -252,7 +265,7 @@ class BackEmf(Effect):
 
     name = "back-emf"
     place = Place.DRIVE
-    parameters = (Parameter("coefficient", "N s/m", -1e6, 1e6, "force lost per speed"),)
+    parameters = (Parameter("coefficient", "N s/m", -1e6, 1e6, "force lost per speed", physical_low=0.0),)
     kernel = back_emf
     says = "the voltage that motion induces takes from the force in proportion to speed"
     equation = "F <- F - c v,  c = Kt Ke / R"
@@ -261,6 +274,7 @@ class BackEmf(Effect):
     experiment = "constant speeds with the drive free and with it saturated"
     example = {"coefficient": 6.0}
     neutral = {"coefficient": 0.0}
+    linear = ("coefficient",)
     order = 80
 
     def damping(self) -> float:
@@ -291,6 +305,8 @@ class Cogging(ListEffect):
     experiment = "slow strokes over several periods in both directions"
     example = {"amplitude": 1.2, "period": 5e-4, "phase": 0.3}
     neutral = {"amplitude": 0.0}
+    linear = ("amplitude",)
+    steady = True
     order = 90
 
     def stiffness(self) -> float:

@@ -33,6 +33,10 @@ left (60 resonance; 70 backlash, after which MOVED and VELOCITY are the load's).
 What modifies friction acts on every model of the catalogue through these wires: displacement reaches a model
 by MOVED only, speed by VELOCITY less LATE, its level by REACH, its size by SCALE.
 
+What a search for a missing effect needs to know stands here too, and nowhere by name: `linear` parameters,
+`neutral` values, `searchable`, `search_grid`, `whole_friction`, `moving_mass`, `steady`, `bias`, `stands_for`
+and `Parameter.physical_low`. Each has its sentence at `Effect`; the defaults do for most.
+
 To feed an effect forward, there are two ways, and its place says which:
 
 - An effect on a signal on its way (VOLTS through the drive, SENSED through the sensor) has, where it can be
@@ -82,6 +86,14 @@ class Parameter:
     """True where `low` itself is not allowed (a period of zero, say)."""
     choice: bool = False
     """True where only `low` and `high` are allowed: which of two kinds it is, no size that a fit moves."""
+    physical_low: float | None = None
+    """Lowest physical value, where a stage file may hold less: as a correction of a number that the stage
+    holds elsewhere, or with the sign in place of half a turn of phase. A search goes no lower."""
+
+    @property
+    def lowest(self) -> float:
+        """Lowest physical value: `physical_low`, or `low` where none is stated."""
+        return self.low if self.physical_low is None else self.physical_low
 
     def check(self, value: Any, owner: str) -> float:
         """Return `value` as a float, or raise ConfigError naming the parameter, the value and the range."""
@@ -127,7 +139,30 @@ class Effect:
     """A representative entry, as `from_dict` takes it, that shows within the motion of the contract tests:
     strokes of +-1 mm and of micrometres, speeds to 50 mm/s, +-8 V, 4 s. The tests run on it by themselves."""
     neutral: ClassVar[Mapping[str, Any] | None] = None
-    """Values that, put over the example, make it change nothing; None where there are none."""
+    """Values that, put over the example, make it change nothing; None where there are none. Of `linear`
+    parameters these are where their change is counted from."""
+    linear: ClassVar[Sequence[str]] = ()
+    """Parameters that its share of the force balance is linear in, the others held: exactly where it adds a
+    force, to first order around `neutral` (around 0 where none is stated) where it changes the friction, the
+    drive, the sensor or the mass. Each is linear alone; together they are where it adds a force."""
+    searchable: ClassVar[bool] = True
+    """Whether a search for missing physics tries it. False for what every stage has or what is identified
+    otherwise: friction models, the sensor's noise and resolution, free curves."""
+    search_grid: ClassVar[Mapping[str, Sequence[float]]] = {}
+    """Start values of a search for parameters without a unit, which gives others their scale."""
+    whole_friction: ClassVar[bool] = False
+    """Whether it asks for the whole of friction (its force or level), so that the friction with it at work is
+    no longer a sum of what single friction elements do."""
+    moving_mass: ClassVar[bool] = False
+    """Whether it sets the moving mass or couples part of it elastically: a share of the stage's own."""
+    steady: ClassVar[bool] = False
+    """Of the drive: whether its force stays as it is while the command is held. Forces beside the drive's,
+    such as cogging's, do not count."""
+    bias: ClassVar[bool] = False
+    """Whether it is a constant force on a linear axis."""
+    stands_for: ClassVar[str] = ""
+    """Key of the stage file's section ``stage`` that it is another way to write, "" for none: a fit moves
+    that number instead."""
     inverse: ClassVar[Kernel | None] = None
     """Undoes the effect on the signal that it passes on (see above); None where it cannot or need not."""
     element: ClassVar[Sequence[Parameter]] = ()

@@ -100,6 +100,8 @@ class GeneralisedMaxwellSlip(ListEffect):
         "viscous": 5.0,
         "elements": [{"stiffness": 6e5, "weight": 0.3}, {"stiffness": 3e5, "weight": 0.7}],
     }  # fmt: skip
+    linear = ("viscous",)
+    searchable = False
 
     def __init__(self, elements: Sequence[Any] = (), **values: float) -> None:
         super().__init__(elements, **values)

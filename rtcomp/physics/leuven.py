@@ -162,6 +162,8 @@ class Leuven(ListEffect):
         "damping": 200.0, "viscous": 5.0,
         "elements": [{"stiffness": 8e5, "reach": 2e-6}, {"stiffness": 4e5, "reach": 7e-6}],
     }  # fmt: skip
+    linear = ("damping", "viscous")
+    searchable = False
 
     def vector(self) -> Floats:
         """Return the plain parameters, the count, then each stretch of the virgin curve: end (N), slope."""

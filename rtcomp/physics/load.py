@@ -44,6 +44,9 @@ class LoadDependentFriction(Effect):
     experiment = "the same stroke at several loads, or accelerating and coasting"
     example = {"coefficient": 0.05}
     neutral = {"coefficient": 0.0, "external": 0.0}
+    linear = ("coefficient",)
+    search_grid = {"stiffening": (0.0, 1.0)}
+    whole_friction = True
     order = 20
 
     def least_parts(self) -> int:

@@ -62,6 +62,8 @@ class LuGre(Effect):
         "stiffness": 1e6, "damping": 300.0, "coulomb": 3.0, "static": 4.0,
         "stribeck_velocity": 2e-3, "exponent": 2.0, "viscous": 5.0,
     }  # fmt: skip
+    linear = ("damping", "viscous")
+    searchable = False
 
     def stiffness(self) -> float:
         """Return twice sigma_0, reached just after a reversal out of sliding (N/m)."""

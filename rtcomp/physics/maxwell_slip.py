@@ -10,7 +10,7 @@ from rtcomp.physics.effect import Parameter, Place
 from rtcomp.physics.lists import ListEffect
 from rtcomp.physics.wires import FRICTION, GRIP, GRIP_LEVEL, GRIP_STIFFNESS, MOVED, REACH, SCALE
 
-STIFFNESS = Parameter("stiffness", "N/m", -1e12, 1e12, "spring of the element")
+STIFFNESS = Parameter("stiffness", "N/m", -1e12, 1e12, "spring of the element", physical_low=0.0)
 REACH_M = Parameter("reach", "m", 0.0, 1e3, "travel at which the element yields", open_low=True)
 
 
@@ -51,6 +51,7 @@ class MaxwellSlip(ListEffect):
     )
     experiment = "nested reversals of decreasing size inside the presliding range"
     example = {"elements": [{"stiffness": 8e5, "reach": 2e-6}, {"stiffness": 4e5, "reach": 7e-6}]}
+    searchable = False
 
     def vector(self) -> Floats:
         """Return count, elements, level (N) and the stiffness with every element sticking (N/m)."""

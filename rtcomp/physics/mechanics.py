@@ -59,6 +59,9 @@ class Inertia(Effect):
     signature = "residual force in proportion to acceleration"
     experiment = "fast reversals beside slow strokes over the same stretch"
     example = {"mass": 2.4}
+    linear = ("mass",)
+    moving_mass = True
+    stands_for = "mass"
     order = 10
 
 
@@ -80,6 +83,7 @@ class ParallelSpring(Effect):
     experiment = "slow strokes over the whole travel, coming back to the same places later"
     example = {"stiffness": 1500.0, "cubic": 1e9}
     neutral = {"stiffness": 0.0, "cubic": 0.0}
+    linear = ("stiffness", "cubic")
 
     def stiffness(self) -> float:
         """Return the slope at 10 mm (10 mrad) from zero (N/m)."""
@@ -94,7 +98,7 @@ class Gravity(Effect):
     place = Place.MECHANICS
     parameters = (
         Parameter("force", "N", -1e6, 1e6, "weight along a linear axis", 0.0),
-        Parameter("amplitude", "N m", -1e6, 1e6, "largest moment about a rotary axis", 0.0),
+        Parameter("amplitude", "N m", -1e6, 1e6, "largest moment about a rotary axis", 0.0, physical_low=0.0),
         Parameter("phase", "rad", -100.0, 100.0, "angle from the horizontal at position zero", 0.0),
     )
     kernel = gravity
@@ -105,6 +109,8 @@ class Gravity(Effect):
     experiment = "slow strokes in both directions; on a rotary axis over a whole turn"
     example = {"force": 2.0}
     neutral = {"force": 0.0, "amplitude": 0.0}
+    linear = ("force", "amplitude")
+    bias = True
 
     def __init__(self, **values: Any) -> None:
         super().__init__(**values)
@@ -138,6 +144,7 @@ class EndStop(Effect):
     experiment = "a slow approach to both ends of the stroke"
     example = {"position": 6e-4, "stiffness": 2e4}
     neutral = {"stiffness": 0.0}
+    linear = ("stiffness",)
 
     def stiffness(self) -> float:
         """Return the stiffness of the contact (N/m)."""

@@ -115,6 +115,8 @@ class ModifiedLeuven(ListEffect):
         "damping": 200.0, "viscous": 5.0,
         "elements": [{"stiffness": 8e5, "reach": 2e-6}, {"stiffness": 4e5, "reach": 7e-6}],
     }  # fmt: skip
+    linear = ("damping", "viscous")
+    searchable = False
 
     def __init__(self, elements: Sequence[Any] = (), **values: float) -> None:
         super().__init__(elements, **values)

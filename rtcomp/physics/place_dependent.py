@@ -48,4 +48,6 @@ class PositionDependentFriction(Effect):
     experiment = "slow strokes over the whole travel in both directions"
     example = {"amplitude": 0.3, "period": 7e-4, "phase": 0.5, "slope": 150.0}
     neutral = {"amplitude": 0.0, "slope": 0.0}
+    linear = ("amplitude", "slope")
+    search_grid = {"stiffening": (0.0, 1.0)}
     order = 20

@@ -57,6 +57,7 @@ class PositionForce(Effect):
     signature = "residual force that depends on position, alike in both directions and at all speeds"
     experiment = "slow strokes over the whole travel in both directions"
     example = {"knots": [-8e-4, -2e-4, 1e-4, 7e-4], "values": [0.5, -1.0, 1.5, 0.4]}
+    searchable = False
 
     def __init__(self, knots: Sequence[Any] = (), values: Sequence[Any] = ()) -> None:
         super().__init__()

@@ -116,6 +116,7 @@ class SensorScale(Effect):
     experiment = "comparison of a long stroke with a second, trusted scale"
     example = {"scale": 1.01}
     neutral = {"scale": 1.0}
+    linear = ("scale",)
     order = 20
 
 
@@ -137,6 +138,7 @@ class SensorPeriodicError(Effect):
     experiment = "the same stretch slowly and fast"
     example = {"amplitude": 5e-6, "period": 2e-4}
     neutral = {"amplitude": 0.0}
+    linear = ("amplitude",)
     order = 30
 
 
@@ -159,6 +161,7 @@ class SensorDrift(Effect):
     experiment = "coming back to the same stop or cogging pattern over a long run"
     example = {"drift": 2e-4, "time_constant": 1.5}
     neutral = {"drift": 0.0}
+    linear = ("drift",)
     order = 40
 
 
@@ -181,6 +184,7 @@ class SensorJump(Effect):
     experiment = "returning to a mechanical reference before and after fast motion"
     example = {"size": 2e-4, "time": 2.3004}
     neutral = {"size": 0.0}
+    linear = ("size",)
     order = 50
 
 
@@ -199,6 +203,7 @@ class SensorNoise(Effect):
     experiment = "holding still, drive off"
     example = {"rms": 1e-5}
     neutral = {"rms": 0.0}
+    searchable = False
     order = 60
 
 
@@ -217,4 +222,5 @@ class SensorResolution(Effect):
     experiment = "the slowest motion that the stage can make"
     example = {"resolution": 2e-5}
     neutral = {"resolution": 0.0}
+    searchable = False
     order = 80

@@ -67,6 +67,7 @@ class FrictionDrift(Effect):
     experiment = "the same stroke at the beginning, in the middle and at the end of a long run"
     example = {"change": 0.4, "time_constant": 1.5}
     neutral = {"change": 0.0}
+    linear = ("change",)
     order = 20
 
 
@@ -96,6 +97,8 @@ class StictionAgeing(Effect):
     experiment = "starts from rest after waiting times spaced logarithmically"
     example = {"growth": 0.1, "distance": 1e-5}
     neutral = {"growth": 0.0}
+    linear = ("growth",)
+    search_grid = {"following": (0.0, 1.0)}
     order = 20
     states = 2
 
@@ -123,5 +126,7 @@ class Creep(Effect):
     experiment = "small steps of force inside presliding, each held for several time constants"
     example = {"fraction": 0.4, "time_constant": 0.05}
     neutral = {"fraction": 0.0}
+    linear = ("fraction",)
+    whole_friction = True
     order = 30
     states = 1

@@ -83,7 +83,7 @@ class ViscousFriction(Effect):
 
     name = "viscous-friction"
     place = Place.FRICTION
-    parameters = (Parameter("coefficient", "N s/m", -1e6, 1e6, "force per speed"),)
+    parameters = (Parameter("coefficient", "N s/m", -1e6, 1e6, "force per speed", physical_low=0.0),)
     kernel = viscous
     says = "friction in proportion to speed"
     equation = "F = c v"
@@ -92,6 +92,8 @@ class ViscousFriction(Effect):
     experiment = "constant speeds, spaced logarithmically, in both directions"
     example = {"coefficient": 8.0}
     neutral = {"coefficient": 0.0}
+    linear = ("coefficient",)
+    stands_for = "viscous"
 
     def damping(self) -> float:
         """Return the coefficient (N s/m)."""
@@ -104,7 +106,9 @@ class QuadraticDrag(Effect):
 
     name = "quadratic-drag"
     place = Place.FRICTION
-    parameters = (Parameter("coefficient", "N s^2/m^2", -1e9, 1e9, "force per speed squared"),)
+    parameters = (
+        Parameter("coefficient", "N s^2/m^2", -1e9, 1e9, "force per speed squared", physical_low=0.0),
+    )
     kernel = quadratic_drag
     says = "friction in proportion to speed squared: air, churned lubricant"
     equation = "F = c |v| v"
@@ -113,6 +117,7 @@ class QuadraticDrag(Effect):
     experiment = "constant speeds, spaced logarithmically up to the fastest, in both directions"
     example = {"coefficient": 400.0}
     neutral = {"coefficient": 0.0}
+    linear = ("coefficient",)
 
     def damping(self) -> float:
         """Return the slope of the force at 1 m/s (1 rad/s) (N s/m)."""
@@ -137,6 +142,9 @@ class MicroDamping(Effect):
     experiment = "small fast oscillations inside presliding"
     example = {"coefficient": 250.0, "speed": 5e-3}
     neutral = {"coefficient": 0.0}
+    linear = ("coefficient",)
+    searchable = False
+    stands_for = "micro_damping"
 
     def damping(self) -> float:
         """Return the coefficient (N s/m)."""
@@ -154,7 +162,7 @@ class Stribeck(Effect):
     name = "stribeck"
     place = Place.FRICTION
     parameters = (
-        Parameter("rise", "1", -0.9, 10.0, "static over sliding level, less one"),
+        Parameter("rise", "1", -0.9, 10.0, "static over sliding level, less one", physical_low=0.0),
         Parameter("velocity", "m/s", 0.0, 1e3, "speed at which the rise has fallen to 1/e", open_low=True),
         *GROWTH,
     )
@@ -166,6 +174,8 @@ class Stribeck(Effect):
     experiment = "slow constant speeds around the Stribeck speed, and starts from rest"
     example = {"rise": 0.3, "velocity": 2e-3}
     neutral = {"rise": 0.0}
+    linear = ("rise",)
+    search_grid = {"following": (0.0, 1.0)}
     order = 20
 
 
@@ -191,6 +201,7 @@ class AsymmetricViscousFriction(Effect):
     experiment = "constant speeds, spaced logarithmically, in both directions"
     example = {"ratio": 0.4}
     neutral = {"ratio": 0.0}
+    linear = ("ratio",)
     order = 10
 
 
@@ -219,5 +230,6 @@ class FrictionalLag(Effect):
     experiment = "speeds that oscillate around the Stribeck velocity without reversal, slowly and fast"
     example = {"time_constant": 2e-2}
     neutral = {"time_constant": 0.0}
+    linear = ("time_constant",)
     order = 5
     states = 2

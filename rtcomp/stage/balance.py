@@ -36,8 +36,6 @@ from rtcomp.stage import lowpass
 from rtcomp.stage.sensed import true_position
 from rtcomp.stage.stage import Stage
 
-STEADY = {"drive-offset", "drive-deadband", "drive-saturation", "drive-gain", "drive-force", "cogging"}
-"""Effects of the drive that do not change its force while the command is held: cogging pushes beside it."""
 PARTS, MIDDLES = 32, 8
 """Parts of a row over which the force of another drive is averaged: one that remembers, and one that goes by
 the motion alone, of which the middles of parts are taken. Of the first the mean is that of their ends, half a
@@ -112,7 +110,7 @@ def forces(
 
 def parts_of_drive(drive: Sequence[Effect]) -> int:
     """Return the parts of a row over which the force of `drive` is to be averaged."""
-    varying = [e for e in drive if e.name not in STEADY]
+    varying = [e for e in drive if not e.steady]
     return 1 if not varying else PARTS if any(e.initial_state().size for e in drive) else MIDDLES
 
 

@@ -12,6 +12,7 @@ from every_effect import ENTRIES, every, example, pick, put
 from rtcomp import physics
 from rtcomp.errors import ConfigError
 from rtcomp.physics import Place
+from rtcomp.stage.schema import Mechanics
 
 # FORMATS.md, "The effects, by name": parameters and units, those that may be left out in brackets.
 VOCABULARY = {
@@ -82,6 +83,32 @@ def test_text_is_complete(entry):
         assert parameter.low < parameter.high
         if parameter.default is not None:
             assert parameter.check(parameter.default, entry.name) == parameter.default
+
+
+@every
+def test_what_a_search_reads_fits_its_parameters(entry):
+    known = {p.name: p for p in entry.parameters}
+    assert set(entry.linear) <= set(known) and not any(known[name].choice for name in entry.linear)
+    if entry.neutral is not None:
+        assert set(entry.linear) <= set(entry.neutral) <= set(known)
+    for name, values in entry.search_grid.items():
+        assert known[name].unit == "1", "a unit gives the others their scale"
+        assert len(values) > 0 and list(values) == sorted(values)
+        for value in values:
+            known[name].check(value, entry.name)
+    for parameter in (*entry.parameters, *entry.element):
+        assert parameter.low <= parameter.lowest < parameter.high
+    assert entry.stands_for == "" or entry.stands_for in Mechanics.model_fields
+    assert not entry.steady or entry.place is Place.DRIVE
+    assert not entry.whole_friction or entry.place is Place.FRICTION
+    assert not entry.moving_mass or entry.place is Place.MECHANICS
+
+
+@every
+def test_a_missing_effect_has_neutral_values(entry):
+    """Without them nobody could say whether an interval holds the values that change nothing."""
+    if entry.searchable and entry.name != "inertia":  # its neutral value is the believed mass
+        assert entry.neutral
 
 
 @every
