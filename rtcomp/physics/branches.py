@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.closing import ASYMMETRY, ClosingBranches
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.wires import FRICTION, GRAIN, GRIP, GRIP_LEVEL, MOVED, REACH, SCALE
+from rtcomp.physics.softening import softened
+from rtcomp.physics.wires import FRICTION, GRAIN, GRIP, GRIP_LEVEL, MOVED, REACH, SCALE, SOFTENS
 
 
 @effect_kernel
@@ -27,10 +30,15 @@ def non_congruent_friction(p: Floats, s: Floats, w: Floats) -> None:
     """p: softening (1)."""
     level = w[GRIP_LEVEL] * w[REACH] * w[SCALE]
     if level > 0.0:
-        share = min(abs(w[GRIP]) / level, 1.0)
-        bent = w[GRIP] * (1.0 + p[0] * (1.0 - share))
+        bent = softened(w[GRIP], level, p[0])
         w[FRICTION] += bent - w[GRIP]
         w[GRIP] = bent
+
+
+@effect_kernel
+def non_congruent_elements(p: Floats, s: Floats, w: Floats) -> None:
+    """p: softening (1)."""
+    w[SOFTENS] = p[0]
 
 
 @register
@@ -92,18 +100,21 @@ class AsymmetricFriction(Effect):
 class NonCongruentFriction(Effect):
     """Equal reversals at different force give loops of different shape.
 
-    The friction model's force F is bent: steeper by 1 + softening at zero force, less steep by 1 - softening
-    at its level, where it is unchanged. A bent output keeps what a memory without drift needs: closed loops
-    stay closed, wiping-out holds, and, the bend being monotone, loops dissipate; only congruency is lost. It
-    needs a friction model in the stage; of damping nothing is bent.
+    In the form `force` the friction model's force F is bent: steeper by 1 + softening at zero force, less
+    steep by 1 - softening at its level, where it is unchanged. In the form `elements` so is the force of each
+    element of a friction model by its deflection over its reach; a model without elements is one element. A
+    bent output keeps what a memory without drift needs: closed loops stay closed, wiping-out holds, and, the
+    bend being monotone, loops dissipate; only congruency is lost. It needs a friction model in the stage; of
+    damping nothing is bent.
     """
 
     name = "non-congruent-friction"
     place = Place.FRICTION
     parameters = (Parameter("softening", "1", -1.0, 1.0, "loss of slope from the middle to the level"),)
     kernel = non_congruent_friction
+    forms = {"force": non_congruent_friction, "elements": non_congruent_elements}
     says = "contacts are softer the more they carry: loops at high force are flatter than those around zero"
-    equation = "F <- F (1 + softening (1 - |F| / level))"
+    equation = "F <- F (1 + softening (1 - |F| / level)), or z_i <- z_i (1 + softening (1 - |z_i| / r_i))"
     source = "Mayergoyz (1991), Mathematical Models of Hysteresis; Kuhnen (2003), European J. Control 9(4)"
     signature = "residual force odd in the friction force, largest at half of its level"
     experiment = "equal small reversals started from different forces"
@@ -112,3 +123,8 @@ class NonCongruentFriction(Effect):
     linear = ("softening",)
     whole_friction = True
     order = 80
+
+    def __init__(self, **values: Any) -> None:
+        super().__init__(**values)
+        if self.form == "elements":  # told to the model before it runs
+            self.order, self.whole_friction = 15, False

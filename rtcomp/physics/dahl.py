@@ -7,7 +7,8 @@ import math
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.wires import FRICTION, GRIP, GRIP_LEVEL, GRIP_STIFFNESS, MOVED, REACH, SCALE
+from rtcomp.physics.softening import softened
+from rtcomp.physics.wires import FRICTION, GRIP, GRIP_LEVEL, GRIP_STIFFNESS, MOVED, REACH, SCALE, SOFTENS
 
 
 @effect_kernel
@@ -33,7 +34,7 @@ def dahl(p: Floats, s: Floats, w: Floats) -> None:
             shrink = 1.0 - (1.0 - p[2]) * travel * math.exp((p[2] - 1.0) * math.log(size))
             left = size * math.exp(math.log(shrink) / (1.0 - p[2])) if shrink > 0.0 else 0.0
         s[0] = direction * level * (1.0 - math.copysign(left, gap))
-    w[GRIP] = s[0] * w[SCALE]
+    w[GRIP] = softened(s[0], p[1] * w[REACH], w[SOFTENS]) * w[SCALE]
     w[GRIP_LEVEL] = p[1]
     w[GRIP_STIFFNESS] = p[0]
     w[FRICTION] += w[GRIP]

@@ -14,21 +14,20 @@ after it, on forces::
     80  back-emf           DRIVE less coefficient times speed
     90  cogging            PUSH plus a periodic part, whatever the command
 
-Phases follow one rule everywhere: sin(2 pi x / period + phase).
+Phases follow one rule everywhere: sin(2 pi x / period + phase), or the triangle of that angle.
 """
 
 from __future__ import annotations
 
 import math
 
-from rtcomp.kernels import Floats, effect_kernel
+from rtcomp.kernels import Floats, compiled, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
 from rtcomp.physics.lists import ListEffect
+from rtcomp.physics.waves import PERIOD, PHASE, SINE, TRIANGLE, triangle
 from rtcomp.physics.wires import DRIVE, GAIN, POSITION, PUSH, STEP, VELOCITY, VOLTS
 
-PERIOD = Parameter("period", "m", 0.0, 1e6, "length after which it repeats", open_low=True)
-PHASE = Parameter("phase", "rad", -100.0, 100.0, "angle at position zero", 0.0)
 FORCE_ORDER = 70
 """Order of `drive-force`."""
 
@@ -95,6 +94,12 @@ def torque_ripple(p: Floats, s: Floats, w: Floats) -> None:
 
 
 @effect_kernel
+def torque_ripple_triangle(p: Floats, s: Floats, w: Floats) -> None:
+    """p: amplitude (1), period (m), phase (rad)."""
+    w[GAIN] *= 1.0 + p[0] * triangle(2.0 * math.pi * w[POSITION] / p[1] + p[2])
+
+
+@effect_kernel
 def drive_force(p: Floats, s: Floats, w: Floats) -> None:
     """No parameters."""
     w[DRIVE] += w[GAIN] * w[VOLTS]
@@ -106,14 +111,27 @@ def back_emf(p: Floats, s: Floats, w: Floats) -> None:
     w[DRIVE] -= p[0] * w[VELOCITY]
 
 
+@compiled
+def _harmonics(p: Floats, angle: float) -> float:
+    """Return the force of the harmonics in the parameters of `cogging`."""
+    force = 0.0
+    for i in range(int(p[3])):
+        force += p[5 + 3 * i] * math.sin(p[4 + 3 * i] * angle + p[6 + 3 * i])
+    return force
+
+
 @effect_kernel
 def cogging(p: Floats, s: Floats, w: Floats) -> None:
     """p: amplitude (N), period (m), phase (rad), count, then order, amplitude and phase of each harmonic."""
     angle = 2.0 * math.pi * w[POSITION] / p[1]
-    force = p[0] * math.sin(angle + p[2])
-    for i in range(int(p[3])):
-        force += p[5 + 3 * i] * math.sin(p[4 + 3 * i] * angle + p[6 + 3 * i])
-    w[PUSH] += force
+    w[PUSH] += p[0] * math.sin(angle + p[2]) + _harmonics(p, angle)
+
+
+@effect_kernel
+def cogging_triangle(p: Floats, s: Floats, w: Floats) -> None:
+    """p: as `cogging`; the harmonics are sines."""
+    angle = 2.0 * math.pi * w[POSITION] / p[1]
+    w[PUSH] += p[0] * triangle(angle + p[2]) + _harmonics(p, angle)
 
 
 @register
@@ -230,6 +248,7 @@ class TorqueRipple(Effect):
     place = Place.DRIVE
     parameters = (Parameter("amplitude", "1", -1.0, 1.0, "relative size of the variation"), PERIOD, PHASE)
     kernel = torque_ripple
+    forms = {SINE: torque_ripple, TRIANGLE: torque_ripple_triangle}
     says = "the force per volt varies periodically along the stroke"
     equation = "force constant <- force constant (1 + a sin(2 pi x / period + phase))"
     source = "Jahns, Soong (1996), IEEE Trans. Industrial Electronics 43(2), pulsating torque"
@@ -284,7 +303,10 @@ class BackEmf(Effect):
 
 @register
 class Cogging(ListEffect):
-    """Force periodic in position, whatever the command; `harmonics` lists {order, amplitude, phase}."""
+    """Force periodic in position, whatever the command; `harmonics` lists {order, amplitude, phase}.
+
+    Harmonics are sines in each form.
+    """
 
     name = "cogging"
     place = Place.DRIVE
@@ -298,6 +320,7 @@ class Cogging(ListEffect):
     list_needed = False
     list_owner = "harmonics"
     kernel = cogging
+    forms = {SINE: cogging, TRIANGLE: cogging_triangle}
     says = "the magnets pull towards preferred places, whatever the command"
     equation = "F = a sin(2 pi x / period + phase) + sum a_k sin(order_k 2 pi x / period + phase_k)"
     source = "Jahns, Soong (1996), IEEE Trans. Industrial Electronics 43(2), cogging torque"

@@ -12,26 +12,30 @@ The chain, run for every integration step, in this order::
     friction     modifiers, then models and speed laws (see below)
     sensor       true to measured position       (changes SENSED; once a tick, not a step)
 
+An effect may come in several `forms`: kernels of the same physics, with the same parameters. A stage file's
+entry says which (``form: level``), without it the first. Names of effects are names of families.
+
 Within a place, effects run by `order`, lowest first. The drive's orders stand in `drive`, the sensor's in
 `sensor`; mechanics: mass (10), then what adds forces (50), then second masses, which take from MASS what is
 left (60 resonance; 70 backlash, after which MOVED and VELOCITY are the load's). Friction::
 
      5  frictional-lag                  sets LATE, LATE_MIDWAY
     10  asymmetric-viscous-friction     sets SKEW
+    15  non-congruent-friction          sets SOFTENS (its form by elements)
     20  stribeck                        REACH  (the yield level at equal stiffness)
         load-dependent-friction         REACH
         stiction-ageing                 REACH
         position-dependent-friction     REACH
-        friction-drift                  SCALE  (the whole force)
+        friction-drift                  SCALE  (the whole force; REACH in its forms of the level)
     30  creep                           MOVED less what the contacts creep
     40  asymmetric-friction             MOVED larger forward than backward
     50  models and speed laws           add to FRICTION; a model leaves GRIP, GRIP_LEVEL, GRIP_STIFFNESS
     70  asymmetric-friction, closing    bends GRIP and exchanges it in FRICTION
-    80  non-congruent-friction          bends GRIP and exchanges it in FRICTION
+    80  non-congruent-friction          bends GRIP and exchanges it in FRICTION (its first form)
    100  (end of backlash)               FRICTION acts on the load behind the play: BEHIND
 
 What modifies friction acts on every model of the catalogue through these wires: displacement reaches a model
-by MOVED only, speed by VELOCITY less LATE, its level by REACH, its size by SCALE.
+by MOVED only, speed by VELOCITY less LATE, its level by REACH, its size by SCALE, its curvature by SOFTENS.
 
 What a search for a missing effect needs to know stands here too, and nowhere by name: `linear` parameters,
 `neutral` values, `searchable`, `search_grid`, `whole_friction`, `moving_mass`, `steady`, `bias`, `stands_for`
@@ -125,8 +129,12 @@ class Effect:
     """The name in stage files, diagnoses and reports."""
     place: ClassVar[Place]
     parameters: ClassVar[Sequence[Parameter]]
-    kernel: ClassVar[Kernel]
-    """``kernel(p, s, w)`` with `p` from `vector()`, `s` from `initial_state()` and `w` the wires."""
+    kernel: Kernel
+    """``kernel(p, s, w)`` with `p` from `vector()`, `s` from `initial_state()` and `w` the wires: of the
+    class that of its first form, of an effect that of its own."""
+    forms: ClassVar[Mapping[str, Kernel]] = {}
+    """Kernels of the same physics by the name of their form, the first one `kernel`; empty for one form only.
+    All take the same parameters, state and neutral values, and are linear in the same parameters."""
     says: ClassVar[str]
     """What it is, one sentence."""
     equation: ClassVar[str]
@@ -150,7 +158,7 @@ class Effect:
     otherwise: friction models, the sensor's noise and resolution, free curves."""
     search_grid: ClassVar[Mapping[str, Sequence[float]]] = {}
     """Start values of a search for parameters without a unit, which gives others their scale."""
-    whole_friction: ClassVar[bool] = False
+    whole_friction: bool = False
     """Whether it asks for the whole of friction (its force or level), so that the friction with it at work is
     no longer a sum of what single friction elements do."""
     moving_mass: ClassVar[bool] = False
@@ -167,17 +175,18 @@ class Effect:
     """Undoes the effect on the signal that it passes on (see above); None where it cannot or need not."""
     element: ClassVar[Sequence[Parameter]] = ()
     """Parameters of each entry of its list, where it takes one (see `lists.ListEffect`)."""
-    order: ClassVar[int] = 50
+    order: int = 50
     states: ClassVar[int] = 0
     """Length of the kernel's own state."""
 
-    def __init__(self, **values: float) -> None:
+    def __init__(self, *, form: Any = None, **values: float) -> None:
         known = {p.name for p in self.parameters}
-        for key in values:
+        for key in (*values, *(["form"] if form is not None and not self.forms else [])):
             if key not in known:
                 raise ConfigError(
                     f"{self.name}: unknown parameter {key!r}; {nearest(key, self._names())}", key=(key,)
                 )
+        self.form = self._form(form)
         self.values: dict[str, float] = {}
         for parameter in self.parameters:
             value = values.get(parameter.name, parameter.default)
@@ -188,9 +197,23 @@ class Effect:
                 )
             self.values[parameter.name] = parameter.check(value, self.name)
 
+    def _form(self, form: Any) -> str:
+        """Take the kernel of `form`, None for the first; return its name, "" where there is one form only."""
+        if not self.forms:
+            return ""
+        first = next(iter(self.forms))
+        if form is None:
+            return first
+        if form not in list(self.forms):
+            raise ConfigError(
+                f"{self.name}: form is {form!r}; {nearest(str(form), self.forms)}", key=("form",)
+            )
+        self.kernel = self.forms[form]
+        return str(form)
+
     def _names(self) -> list[str]:
         """Return the keys that an entry of this effect may have, without its name."""
-        return [p.name for p in self.parameters]
+        return [*(p.name for p in self.parameters), *(["form"] if self.forms else [])]
 
     def vector(self) -> Floats:
         """Return the parameters as the kernel's `p`."""
@@ -229,8 +252,9 @@ class Effect:
         return []
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the entry as a stage file's ``effects`` lists it."""
-        return {"name": self.name, **self.values}
+        """Return the entry as a stage file's ``effects`` lists it; the first form goes without saying."""
+        form = {"form": self.form} if self.form not in ("", *list(self.forms)[:1]) else {}
+        return {"name": self.name, **form, **self.values}
 
     @classmethod
     def from_dict(cls, entry: Mapping[str, Any]) -> Effect:
@@ -238,8 +262,11 @@ class Effect:
         return cls(**entry)
 
     def __repr__(self) -> str:
-        inner = ", ".join(f"{k}={v:g}" for k, v in self.values.items())
-        return f"{type(self).__name__}({inner})"
+        return f"{type(self).__name__}({', '.join(self._shown())})"
+
+    def _shown(self) -> list[str]:
+        form = [f"form={self.form!r}"] if self.form else []
+        return [*form, *(f"{k}={v:g}" for k, v in self.values.items())]
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Effect) and self.to_dict() == other.to_dict()

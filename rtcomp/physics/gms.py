@@ -14,6 +14,7 @@ from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Parameter, Place
 from rtcomp.physics.level import LEVEL, VISCOUS, speed_midway, stribeck_level, viscous_speed
 from rtcomp.physics.lists import ListEffect
+from rtcomp.physics.softening import softened
 from rtcomp.physics.wires import (
     FRICTION,
     GRIP,
@@ -22,6 +23,7 @@ from rtcomp.physics.wires import (
     MOVED,
     REACH,
     SCALE,
+    SOFTENS,
     STEP,
 )  # fmt: skip
 
@@ -40,7 +42,7 @@ def gms(p: Floats, s: Floats, w: Floats) -> None:
     nominal = stribeck_level(p[0], p[1], p[2], p[3], speed_midway(w))
     if moved == 0.0:  # at rest there is no direction: elements keep what they have
         for i in range(count):
-            force += s[i]
+            force += softened(s[i], p[8 + 2 * i] * nominal * w[REACH], w[SOFTENS])
     else:
         level = nominal * w[REACH]
         direction = math.copysign(1.0, moved)
@@ -64,7 +66,7 @@ def gms(p: Floats, s: Floats, w: Floats) -> None:
             if slipping > 0.0:
                 along = yielding + (along - yielding) * math.exp(-relax * slipping)
             s[i] = along * direction
-            force += s[i]
+            force += softened(s[i], yielding, w[SOFTENS])
     w[GRIP] = force * w[SCALE]
     w[GRIP_LEVEL] = nominal
     w[GRIP_STIFFNESS] = p[7 + 2 * count]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics.effect import Parameter
 from rtcomp.physics.wires import MOVED, REACH, SCALE
@@ -18,6 +20,8 @@ FOLLOWING = Parameter(
     0.0,
 )
 GROWTH = (STIFFENING, FOLLOWING)
+LEAST: Final = 1e-3
+"""Smallest factor on the level (1): friction never drives."""
 
 
 @compiled

@@ -33,6 +33,7 @@ from rtcomp.physics.effect import Parameter, Place
 from rtcomp.physics.level import LEVEL, VISCOUS, speed_midway, stribeck_level, viscous_speed
 from rtcomp.physics.lists import ListEffect
 from rtcomp.physics.modified_leuven import DAMPING
+from rtcomp.physics.softening import softened
 from rtcomp.physics.wires import (
     FRICTION,
     GRIP,
@@ -42,6 +43,7 @@ from rtcomp.physics.wires import (
     MOVED,
     REACH,
     SCALE,
+    SOFTENS,
     VELOCITY,
 )  # fmt: skip
 
@@ -124,7 +126,7 @@ def leuven(p: Floats, s: Floats, w: Floats) -> None:
         span = stribeck_level(p[0], p[1], p[2], p[3], v - w[LATE]) * w[REACH] - start
         done = s[_DIRECTION] * s[_FORCE] - start
         rate = v * flow(done / span, n) if span > 0.0 else 0.0
-    w[GRIP] = s[_FORCE] * w[SCALE]
+    w[GRIP] = softened(s[_FORCE], nominal * w[REACH], w[SOFTENS]) * w[SCALE]
     w[GRIP_LEVEL] = nominal
     w[GRIP_STIFFNESS] = p[_COUNT + 2]
     w[FRICTION] += w[GRIP] + p[5] * rate * w[SCALE] + p[6] * viscous_speed(w)

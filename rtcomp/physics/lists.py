@@ -24,7 +24,7 @@ class ListEffect(Effect):
     list_owner: ClassVar[str] = "friction"
     """What a message calls the list: ``friction[2]: reach is ...``."""
 
-    def __init__(self, elements: Sequence[Any] = (), **values: float) -> None:
+    def __init__(self, elements: Sequence[Any] = (), **values: Any) -> None:
         super().__init__(**values)
         if self.list_needed and not elements:
             inside = ", ".join(q.name for q in self.element)
@@ -87,5 +87,5 @@ class ListEffect(Effect):
         return cls(items, **rest)
 
     def __repr__(self) -> str:
-        inner = "".join(f", {k}={v:g}" for k, v in self.values.items())
-        return f"{type(self).__name__}({len(self.elements)} {self.list_name}{inner})"
+        inner = ", ".join([f"{len(self.elements)} {self.list_name}", *self._shown()])
+        return f"{type(self).__name__}({inner})"

@@ -8,6 +8,7 @@ from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
 from rtcomp.physics.level import LEVEL, VISCOUS, speed_midway, stribeck_level, viscous_speed
+from rtcomp.physics.softening import softened
 from rtcomp.physics.wires import (
     FRICTION,
     GRIP,
@@ -17,6 +18,7 @@ from rtcomp.physics.wires import (
     MOVED,
     REACH,
     SCALE,
+    SOFTENS,
     VELOCITY,
 )  # fmt: skip
 
@@ -31,7 +33,7 @@ def lugre(p: Floats, s: Floats, w: Floats) -> None:
     # The solution at constant speed depends on the displacement only: exact for a step of any size.
     s[0] += (math.copysign(settled, moved) - s[0]) * -math.expm1(-abs(moved) / settled)
     rate = v - abs(v) * s[0] * p[0] / (stribeck_level(p[2], p[3], p[4], p[5], v - w[LATE]) * w[REACH])
-    w[GRIP] = p[0] * s[0] * w[SCALE]
+    w[GRIP] = softened(p[0] * s[0], level * w[REACH], w[SOFTENS]) * w[SCALE]
     w[GRIP_LEVEL] = level
     w[GRIP_STIFFNESS] = p[0]
     w[FRICTION] += w[GRIP] + p[1] * rate * w[SCALE] + p[6] * viscous_speed(w)

@@ -8,7 +8,8 @@ from rtcomp.kernels import Floats, compiled, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Parameter, Place
 from rtcomp.physics.lists import ListEffect
-from rtcomp.physics.wires import FRICTION, GRIP, GRIP_LEVEL, GRIP_STIFFNESS, MOVED, REACH, SCALE
+from rtcomp.physics.softening import softened
+from rtcomp.physics.wires import FRICTION, GRIP, GRIP_LEVEL, GRIP_STIFFNESS, MOVED, REACH, SCALE, SOFTENS
 
 STIFFNESS = Parameter("stiffness", "N/m", -1e12, 1e12, "spring of the element", physical_low=0.0)
 REACH_M = Parameter("reach", "m", 0.0, 1e3, "travel at which the element yields", open_low=True)
@@ -26,8 +27,9 @@ def maxwell_slip(p: Floats, s: Floats, w: Floats) -> None:
     force = 0.0
     count = int(p[0])
     for i in range(count):
-        s[i] = stretched(s[i], w[MOVED], p[2 + 2 * i] * w[REACH])
-        force += p[1 + 2 * i] * s[i]
+        reach = p[2 + 2 * i] * w[REACH]
+        s[i] = stretched(s[i], w[MOVED], reach)
+        force += p[1 + 2 * i] * softened(s[i], reach, w[SOFTENS])
     w[GRIP] = force * w[SCALE]
     w[GRIP_LEVEL] = p[1 + 2 * count]
     w[GRIP_STIFFNESS] = p[2 + 2 * count]

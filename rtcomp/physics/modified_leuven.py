@@ -15,6 +15,7 @@ from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Parameter, Place
 from rtcomp.physics.level import LEVEL, VISCOUS, speed_midway, stribeck_level, viscous_speed
 from rtcomp.physics.lists import ListEffect
+from rtcomp.physics.softening import softened
 from rtcomp.physics.wires import (
     FRICTION,
     GRIP,
@@ -24,6 +25,7 @@ from rtcomp.physics.wires import (
     MOVED,
     REACH,
     SCALE,
+    SOFTENS,
     VELOCITY,
 )  # fmt: skip
 
@@ -77,14 +79,15 @@ def modified_leuven(p: Floats, s: Floats, w: Floats) -> None:
         for i in range(count):
             reach = p[9 + 2 * i] * widen
             s[i] = min(max(s[i] + z, -reach), reach)
-    force = 0.0
+    force = bent = 0.0
     for i in range(count):
         reach = p[9 + 2 * i] * widen
         s[i] = min(max(s[i], -reach), reach)
         force += p[8 + 2 * i] * s[i]
+        bent += p[8 + 2 * i] * softened(s[i], reach, w[SOFTENS])
     level = stribeck_level(p[0], p[1], p[2], p[3], v - w[LATE]) * widen
     rate = v * flow(math.copysign(1.0, v) * force / level, n)
-    w[GRIP] = force * w[SCALE]
+    w[GRIP] = bent * w[SCALE]
     w[GRIP_LEVEL] = nominal
     w[GRIP_STIFFNESS] = p[8 + 2 * count]
     w[FRICTION] += w[GRIP] + p[5] * rate * w[SCALE] + p[6] * viscous_speed(w)

@@ -4,21 +4,33 @@ from __future__ import annotations
 
 import math
 
-from rtcomp.kernels import Floats, effect_kernel
+from rtcomp.kernels import Floats, compiled, effect_kernel
 from rtcomp.physics.catalogue import register
-from rtcomp.physics.drive import PERIOD, PHASE
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.growing import GROWTH, grow
+from rtcomp.physics.growing import GROWTH, LEAST, grow
+from rtcomp.physics.waves import PERIOD, PHASE, SINE, TRIANGLE, triangle
 from rtcomp.physics.wires import POSITION
+
+
+@compiled
+def _vary(p: Floats, w: Floats, factor: float) -> None:
+    """Multiply the level of friction by `factor`; friction never drives."""
+    factor = max(factor, LEAST)
+    grow(w, factor, factor, p[4], p[5])
 
 
 @effect_kernel
 def position_dependent_friction(p: Floats, s: Floats, w: Floats) -> None:
     """p: amplitude (1), period (m), phase (rad), slope (1/m), stiffening (1), following (1)."""
     x = w[POSITION]
-    factor = 1.0 + p[0] * math.sin(2.0 * math.pi * x / p[1] + p[2]) + p[3] * x
-    factor = max(factor, 1e-3)  # friction never drives
-    grow(w, factor, factor, p[4], p[5])
+    _vary(p, w, 1.0 + p[0] * math.sin(2.0 * math.pi * x / p[1] + p[2]) + p[3] * x)
+
+
+@effect_kernel
+def position_dependent_triangle(p: Floats, s: Floats, w: Floats) -> None:
+    """p: as `position_dependent_friction`."""
+    x = w[POSITION]
+    _vary(p, w, 1.0 + p[0] * triangle(2.0 * math.pi * x / p[1] + p[2]) + p[3] * x)
 
 
 @register
@@ -26,7 +38,7 @@ class PositionDependentFriction(Effect):
     """Friction level varies along the stroke.
 
     With `stiffening` 0 contacts yield later at equal stiffness; with 1 the whole force varies, as where the
-    number of contacts does.
+    number of contacts does. The periodic part is a sine or, in the form `triangle`, a triangle.
     """
 
     name = "position-dependent-friction"
@@ -39,6 +51,7 @@ class PositionDependentFriction(Effect):
         *GROWTH,
     )
     kernel = position_dependent_friction
+    forms = {SINE: position_dependent_friction, TRIANGLE: position_dependent_triangle}
     says = "contacts yield later in some places than in others: preload, wear, dirt"
     equation = "yield <- yield (1 + a sin(2 pi x / period + phase) + slope x), at equal stiffness or reach"
     source = (

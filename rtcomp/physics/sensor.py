@@ -17,8 +17,8 @@ import math
 
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
-from rtcomp.physics.drive import PERIOD, PHASE
 from rtcomp.physics.effect import Effect, Parameter, Place
+from rtcomp.physics.waves import PERIOD, PHASE
 from rtcomp.physics.wires import NOISE, SENSED, TIME
 
 

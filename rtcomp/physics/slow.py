@@ -8,8 +8,8 @@ from typing import Final
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.growing import GROWTH, grow
-from rtcomp.physics.wires import GRAIN, GRIP, GRIP_STIFFNESS, MOVED, SCALE, STEP, TIME
+from rtcomp.physics.growing import GROWTH, LEAST, grow
+from rtcomp.physics.wires import GRAIN, GRIP, GRIP_STIFFNESS, MOVED, REACH, SCALE, STEP, TIME
 
 FRESH: Final = 0.1
 """Time at rest (s) from which on the logarithm of ageing grows, unless told."""
@@ -19,6 +19,18 @@ FRESH: Final = 0.1
 def friction_drift(p: Floats, s: Floats, w: Floats) -> None:
     """p: change (1), time constant (s)."""
     w[SCALE] *= 1.0 + p[0] * -math.expm1(-w[TIME] / p[1])
+
+
+@effect_kernel
+def friction_drift_level(p: Floats, s: Floats, w: Floats) -> None:
+    """p: change (1), time constant (s)."""
+    w[REACH] *= max(1.0 + p[0] * -math.expm1(-w[TIME] / p[1]), LEAST)
+
+
+@effect_kernel
+def friction_drift_linear(p: Floats, s: Floats, w: Floats) -> None:
+    """p: change (1), time constant (s)."""
+    w[REACH] *= max(1.0 + p[0] * min(w[TIME] / p[1], 1.0), LEAST)
 
 
 @effect_kernel
@@ -51,7 +63,11 @@ def creep(p: Floats, s: Floats, w: Floats) -> None:
 
 @register
 class FrictionDrift(Effect):
-    """Level drifts with time or temperature; not viscous friction."""
+    """Level drifts with time or temperature; not viscous friction.
+
+    In the form `force` the whole force drifts. In `level` and `linear` contacts yield later or earlier at
+    equal stiffness: in `level` exponentially, in `linear` along a line that ends at the time constant.
+    """
 
     name = "friction-drift"
     place = Place.FRICTION
@@ -60,8 +76,9 @@ class FrictionDrift(Effect):
         Parameter("time_constant", "s", 0.0, 1e7, "with which it comes, from the start", open_low=True),
     )
     kernel = friction_drift
+    forms = {"force": friction_drift, "level": friction_drift_level, "linear": friction_drift_linear}
     says = "friction grows or falls while the stage runs in or warms up"
-    equation = "F <- F (1 + change (1 - exp(-t / T)))"
+    equation = "F or yield <- (1 + change (1 - exp(-t / T))) times it, or yield (1 + change min(t / T, 1))"
     source = "Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), run-in and temperature"
     signature = "residual force with the sign of motion whose size changes along the recording"
     experiment = "the same stroke at the beginning, in the middle and at the end of a long run"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rtcomp.kernels import Floats, effect_kernel
+from rtcomp.kernels import Floats, compiled, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
 from rtcomp.physics.growing import GROWTH, grow
@@ -35,12 +35,30 @@ def micro_damping(p: Floats, s: Floats, w: Floats) -> None:
     w[FRICTION] += p[0] * math.exp(-ratio * ratio) * w[VELOCITY]
 
 
+@compiled
+def _fall(p: Floats, w: Floats, now: float, midway: float) -> None:
+    """Raise the level by the rise times exp(-now), exp(-midway) in the step's middle."""
+    factor, halfway = 1.0 + p[0] * math.exp(-now), 1.0 + p[0] * math.exp(-midway)
+    grow(w, factor, halfway, max(p[2], w[STIFFENS]), max(p[3], w[FOLLOWS]))
+
+
 @effect_kernel
 def stribeck(p: Floats, s: Floats, w: Floats) -> None:
     """p: rise (1), velocity (m/s), stiffening (1), following (1)."""
     now, midway = speed_now(w) / p[1], speed_midway(w) / p[1]
-    factor, halfway = 1.0 + p[0] * math.exp(-now * now), 1.0 + p[0] * math.exp(-midway * midway)
-    grow(w, factor, halfway, max(p[2], w[STIFFENS]), max(p[3], w[FOLLOWS]))
+    _fall(p, w, now * now, midway * midway)
+
+
+@effect_kernel
+def stribeck_exponential(p: Floats, s: Floats, w: Floats) -> None:
+    """p: as `stribeck`."""
+    _fall(p, w, abs(speed_now(w) / p[1]), abs(speed_midway(w) / p[1]))
+
+
+@effect_kernel
+def stribeck_root(p: Floats, s: Floats, w: Floats) -> None:
+    """p: as `stribeck`."""
+    _fall(p, w, math.sqrt(abs(speed_now(w) / p[1])), math.sqrt(abs(speed_midway(w) / p[1])))
 
 
 @effect_kernel
@@ -155,8 +173,9 @@ class MicroDamping(Effect):
 class Stribeck(Effect):
     """Friction that falls with speed from its static level.
 
-    What sticks keeps its force while the level changes; with `following` 1 it follows at once, with
-    `stiffening` 1 its stiffness does too.
+    It falls as exp(-|v / v_s|^d): d is 2 in the form `gaussian`, 1 in `exponential`, 1/2 in `root`. What
+    sticks keeps its force while the level changes; with `following` 1 it follows at once, with `stiffening`
+    1 its stiffness does too.
     """
 
     name = "stribeck"
@@ -167,8 +186,9 @@ class Stribeck(Effect):
         *GROWTH,
     )
     kernel = stribeck
+    forms = {"gaussian": stribeck, "exponential": stribeck_exponential, "root": stribeck_root}
     says = "friction falls with speed from its static level: the yield level is higher near rest"
-    equation = "yield <- yield (1 + rise exp(-(v / v_s)^2))"
+    equation = "yield <- yield (1 + rise exp(-|v / v_s|^d)), d = 2, 1 or 1/2"
     source = "Stribeck (1902); Al-Bender, Lampaert, Swevers (2005), IEEE TAC 50(11), eq. for s(v)"
     signature = "residual peaks at break-away and at low speed, same sign as the motion"
     experiment = "slow constant speeds around the Stribeck speed, and starts from rest"

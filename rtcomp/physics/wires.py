@@ -6,8 +6,8 @@ opposes motion. All SI.
 Who drives the chain resets before each step what effects add to (DRIVE, PUSH, FRICTION: 0), multiply (REACH,
 SCALE: 1) and take from the stage (MASS, GAIN). GRIP, GRIP_LEVEL, GRIP_STIFFNESS and BEHIND stay from step to
 step: written late in the chain, they are read before that at the next step (0 at first). LATE, LATE_MIDWAY,
-SKEW, STIFFENS and FOLLOWS are written by their one effect at each step and are 0 without it. A stage has one
-friction model; of two, the later one's GRIP would be read.
+SKEW, STIFFENS, FOLLOWS and SOFTENS are written by their one effect at each step and are 0 without it. A stage
+has one friction model; of two, the later one's GRIP would be read.
 """
 
 from __future__ import annotations
@@ -39,5 +39,6 @@ GRAIN = 22  # m, motion smaller than this is the sensor's noise; 0 in simulation
 STIFFENS = 23  # 1, how much levels that change late stiffen what sticks: 0 they only hold more, 1 all grows
 FOLLOWS = 24  # 1, how much what sticks follows such levels at once
 LATE_MIDWAY = 25  # m/s, LATE in the middle of the step
+SOFTENS = 26  # 1, how much steeper elements of the friction model are at rest, less steep where they yield
 
-COUNT = 26
+COUNT = 27

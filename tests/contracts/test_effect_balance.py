@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from every_effect import every
+from every_effect import every_form
 
 from rtcomp import physics
 from rtcomp.physics import Place
@@ -69,7 +69,7 @@ def recorded(stage: Stage, seconds: float = 6.0) -> tuple[np.ndarray, np.ndarray
     return t, position, voltage
 
 
-@every
+@every_form
 def test_the_balance_is_that_of_the_simulation(entry: type[physics.Effect]) -> None:
     if entry.name in UNSEEN:
         pytest.skip(UNSEEN[entry.name])

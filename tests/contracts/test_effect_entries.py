@@ -145,6 +145,31 @@ def test_it_goes_through_its_dictionary_unchanged(entry):
     assert type(effect).__name__ in repr(effect)
 
 
+@every
+def test_its_forms_are_named_in_its_dictionary(entry):
+    plain = example(entry)
+    assert "form" not in plain.to_dict()
+    if not entry.forms:
+        with pytest.raises(ConfigError, match="unknown parameter 'form'"):
+            example(entry, form="level")
+        return
+    first, *others = entry.forms
+    assert others and entry.forms[first] is entry.kernel is plain.kernel
+    assert example(entry, form=first) == plain and plain.form == first
+    for form in others:
+        effect = example(entry, form=form)
+        text = effect.to_dict()
+        assert text["form"] == effect.form == form and effect.kernel is entry.forms[form]
+        assert physics.build(text) == effect != plain
+        assert form in repr(effect)
+        with pytest.raises(ConfigError, match=rf"form is '{form}x'; did you mean '{form}'") as caught:
+            example(entry, form=form + "x")
+        assert caught.value.key == ("form",)
+    for wrong in (1.0, True, ["level"]):
+        with pytest.raises(ConfigError, match="form is"):
+            example(entry, form=wrong)
+
+
 def wrong_values(parameter):
     yield math.nan
     yield math.inf

@@ -9,7 +9,7 @@ import copy
 
 import numpy as np
 import pytest
-from every_effect import ENTRIES, every, example, pick, put
+from every_effect import ENTRIES, every_form, example, pick, put
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
@@ -82,7 +82,7 @@ def leaves(tree, path=()):
     return [path] if isinstance(tree, int | float) else []
 
 
-@every
+@every_form
 def test_it_changes_the_output(entry):
     with_it, without = signals(example(entry)), signals()
     assert np.all(np.isfinite(with_it))
@@ -90,7 +90,17 @@ def test_it_changes_the_output(entry):
     assert np.any(change > 1e-3 * np.max(np.abs(without), axis=0)), change
 
 
-@every
+@pytest.mark.parametrize("kind", [e for e in ENTRIES if e.forms], ids=lambda kind: kind.name)
+def test_each_form_does_something_else(kind):
+    made = [signals(example(kind, form=form)) for form in kind.forms]
+    still = signals()
+    for i, one in enumerate(made):
+        for other in made[:i]:
+            size = np.max(np.abs(other - still), axis=0)
+            assert np.any(np.max(np.abs(one - other), axis=0) > 1e-2 * size)
+
+
+@every_form
 def test_neutral_values_change_nothing(entry):
     if entry.neutral is None:
         pytest.skip("has no neutral values")
@@ -114,7 +124,7 @@ def smooth_motion() -> np.ndarray:
 SMOOTH = smooth_motion()
 
 
-@every
+@every_form
 def test_it_is_linear_where_it_says_so(entry):
     """Twice as far from neutral, twice the change; exactly where it adds a force, else to first order."""
     for name in entry.linear:
@@ -136,7 +146,7 @@ def test_it_is_linear_where_it_says_so(entry):
         assert np.all(rest <= 0.15 * scale + 1e-9), (name, rest, scale)
 
 
-@every
+@every_form
 def test_it_asks_for_the_whole_of_friction_only_where_it_says_so(entry):
     """What the friction model left changes what a modifier does: its force, its level, its stiffness."""
     if entry.place is not Place.FRICTION:
@@ -155,7 +165,7 @@ def test_it_asks_for_the_whole_of_friction_only_where_it_says_so(entry):
     assert np.array_equal(made[0], made[1]) != any(e.whole_friction for e in effects)
 
 
-@every
+@every_form
 def test_a_steady_drive_keeps_its_force_while_the_command_is_held(entry):
     if entry.place is not Place.DRIVE:
         pytest.skip("is no drive")
@@ -166,7 +176,7 @@ def test_a_steady_drive_keeps_its_force_while_the_command_is_held(entry):
     assert held == entry.steady
 
 
-@every
+@every_form
 def test_a_bias_is_the_same_force_everywhere(entry):
     change = signals(example(entry)) - signals()
     force = (
@@ -176,14 +186,14 @@ def test_a_bias_is_the_same_force_everywhere(entry):
     assert constant == entry.bias
 
 
-@every
+@every_form
 def test_the_moving_mass_is_changed_only_where_it_says_so(entry):
     """A play takes its load away too, but not in proportion to what is left."""
     changed = not np.array_equal(signals(example(entry))[:, SIGNALS.index(MASS)], MOTION[:, MASS])
     assert changed == (entry.moving_mass or entry.name == "backlash")
 
 
-@every
+@every_form
 def test_the_kernel_in_python_is_the_compiled_one(entry):
     effect = example(entry)
     kernels = [entry.kernel] + ([entry.inverse] if entry.inverse else [])
@@ -198,7 +208,7 @@ def test_the_kernel_in_python_is_the_compiled_one(entry):
         np.testing.assert_allclose(plain, fast, rtol=1e-9, atol=1e-15)
 
 
-@every
+@every_form
 @settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(seed=st.integers(0, 2**31), size=st.sampled_from([1e-9, 1e-6, 1e-4, 1e-2]))
 def test_state_and_output_stay_bounded_under_any_motion(entry, seed, size):
@@ -227,7 +237,7 @@ def test_state_and_output_stay_bounded_under_any_motion(entry, seed, size):
     assert np.max(np.abs(rows[:, [DRIVE, PUSH, FRICTION]])) < 1e7
 
 
-@every
+@every_form
 def test_stiffness_and_damping_bound_the_forces(entry):
     """The integrator takes its step from them."""
     effect = example(entry)
@@ -257,7 +267,7 @@ def test_stiffness_and_damping_bound_the_forces(entry):
                 assert abs(force(w, 0.0, speed) - still) / 1e-6 <= 1.01 * damping + 1e-3
 
 
-@every
+@every_form
 def test_its_inverse_cancels_it(entry):
     if entry.inverse is None:
         pytest.skip("has no inverse")
@@ -280,7 +290,7 @@ def test_only_signals_on_their_way_have_an_inverse():
         assert entry.inverse is None or entry.place in (Place.DRIVE, Place.SENSOR)
 
 
-@every
+@every_form
 def test_its_parameters_come_back_from_data_made_with_it(entry):
     """Least squares on what the kernel gives with 0.1 % noise, from a start 3 % off."""
     text = {**copy.deepcopy(dict(entry.example)), "name": entry.name}
