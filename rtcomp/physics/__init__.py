@@ -1,6 +1,7 @@
 """The catalogue of physics: a family of effects a file. Importing this package fills the catalogue."""
 
 from rtcomp.physics import (
+    bouc_wen,
     branches,
     coupled,
     dahl,
@@ -28,6 +29,7 @@ __all__ = [
     "Effect",
     "Parameter",
     "Place",
+    "bouc_wen",
     "branches",
     "build",
     "coupled",

@@ -29,7 +29,7 @@ left (60 resonance; 70 backlash, after which MOVED and VELOCITY are the load's).
         friction-drift                  SCALE  (the whole force; REACH in its forms of the level)
     30  creep                           MOVED less what the contacts creep
     40  asymmetric-friction             MOVED larger forward than backward
-    50  models and speed laws           add to FRICTION; a model leaves GRIP, GRIP_LEVEL, GRIP_STIFFNESS
+    50  models, bouc-wen, speed laws    add to FRICTION; a model leaves GRIP, GRIP_LEVEL, GRIP_STIFFNESS
     70  asymmetric-friction, closing    bends GRIP and exchanges it in FRICTION
     80  non-congruent-friction          bends GRIP and exchanges it in FRICTION (its first form)
    100  (end of backlash)               FRICTION acts on the load behind the play: BEHIND
@@ -39,7 +39,7 @@ by MOVED only, speed by VELOCITY less LATE, its level by REACH, its size by SCAL
 
 What a search for a missing effect needs to know stands here too, and nowhere by name: `linear` parameters,
 `neutral` values, `searchable`, `search_grid`, `whole_friction`, `moving_mass`, `steady`, `bias`, `stands_for`
-and `Parameter.physical_low`. Each has its sentence at `Effect`; the defaults do for most.
+`Parameter.physical_low` and `Parameter.held`. Each has its sentence at `Effect`; the defaults do for most.
 
 To feed an effect forward, there are two ways, and its place says which:
 
@@ -93,6 +93,9 @@ class Parameter:
     physical_low: float | None = None
     """Lowest physical value, where a stage file may hold less: as a correction of a number that the stage
     holds elsewhere, or with the sign in place of half a turn of phase. A search goes no lower."""
+
+    held: bool = False
+    """True where a fit leaves it as it is: other parameters make up for any change of it."""
 
     @property
     def lowest(self) -> float:

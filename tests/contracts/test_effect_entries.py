@@ -49,6 +49,7 @@ VOCABULARY = {
         "stiction-ageing": "growth (1), distance (m), onset (s), stiffening (1), following (1)",
         "friction-drift": "change (1), time_constant (s)",
         "creep": "fraction (1), time_constant (s)",
+        "bouc-wen": "alpha (N/m), beta (1/m), gamma (1), delta (1), exponent (1)",
     },
     "sensor": {
         "sensor-scale": "scale (1)",

@@ -295,7 +295,10 @@ def test_its_parameters_come_back_from_data_made_with_it(entry):
     """Least squares on what the kernel gives with 0.1 % noise, from a start 3 % off."""
     text = {**copy.deepcopy(dict(entry.example)), "name": entry.name}
     paths = []
+    held = {p.name for p in entry.parameters if p.held}
     for path in leaves(text):
+        if path[-1] in held:
+            continue
         try:
             moved = [signals(physics.build(put(text, path, pick(text, path) * f))) for f in (1.03, 0.97)]
         except ConfigError:
