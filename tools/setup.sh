@@ -1,7 +1,7 @@
 #!/bin/sh
 # Make the environment .venv and install rtcomp into it, editable.
 #   tools/setup.sh run    what running it needs
-#   tools/setup.sh dev    that, every optional format and link, and the tools of tests and checks
+#   tools/setup.sh dev    that, every optional format, and the tools of tests and checks
 # PYTHON chooses the interpreter; else the first of the usual names that is Python 3.11 or newer and can make
 # environments. Trying each is the only way to know: version managers leave names behind that do not run.
 set -eu
@@ -38,7 +38,7 @@ if ! "$venv/bin/python" -m pip --version >/dev/null 2>&1; then
 fi
 case $kind in
     run) what=. ;;
-    dev) what='.[dev,parquet,mcap,can]' ;;
+    dev) what='.[dev,parquet,mcap]' ;;
     *) echo "setup: '$kind' is neither run nor dev" >&2; exit 1 ;;
 esac
 echo "setup: installing what rtcomp needs into $venv (once; a minute or two) ..."

@@ -11,7 +11,7 @@ import math
 import time
 from typing import TYPE_CHECKING, Any
 
-from rtcomp.errors import ConfigError, DeviceBusyError, DeviceError, DeviceTimeoutError
+from rtcomp.errors import DeviceBusyError, DeviceError, DeviceTimeoutError
 from rtcomp.loop.device import OK, STALE, Sample
 from rtcomp_drivers.can_link import CanLink, check_interface
 from rtcomp_drivers.cia402_objects import STAND_IN
@@ -199,12 +199,8 @@ class Cia402Driver(Driver):
             self._give_back(talk)
 
     def _load_eds(self) -> Any:
-        try:
-            from rtcomp_drivers.cia402_setup import RATED_TORQUE, WATCHDOG, load_eds
-        except ImportError as error:
-            raise ConfigError(
-                "device: driver 'cia402' needs python-can and canopen; pip install 'rtcomp[can]'"
-            ) from error
+        from rtcomp_drivers.cia402_setup import RATED_TORQUE, WATCHDOG, load_eds
+
         further = {}
         if self.settings.drive_watchdog:
             further[WATCHDOG] = (

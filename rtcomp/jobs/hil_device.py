@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +30,6 @@ def device_on(link: str, port: str, watchdog: float, axis: str, *, prove: bool =
         raise ConfigError(f"hil: unknown link {link!r}; {nearest(link, LINKS)}")
     if link == "serial":
         return {**common, "port": port}
-    if importlib.util.find_spec("can") is None:
-        raise ConfigError(f"hil: the link {link!r} needs python-can; pip install 'rtcomp[can]'")
     common |= {"interface": "slcan", "channel": port, "bitrate": 1_000_000}
     if link == "odrive-can":
         from rtcomp_drivers.odrive_axis import LEAD

@@ -247,7 +247,6 @@ def test_error_frames_are_counted_and_bus_off_is_the_end(frame, says):
 
 
 def test_python_can_s_own_multicast_bus():
-    pytest.importorskip("msgpack", reason="python-can's udp_multicast needs msgpack")
     try:
         one, other = link("udp_multicast", "239.74.163.2"), link("udp_multicast", "239.74.163.2")
     except DeviceError as error:

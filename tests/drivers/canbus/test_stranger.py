@@ -22,7 +22,6 @@ from rtcomp.errors import DeviceError, ProtocolError
 from rtcomp.loop.device import OK
 
 pytest.importorskip("odrive_can", reason="the mock is in the package odrive-can")
-pytest.importorskip("msgpack", reason="python-can's udp_multicast needs it")
 
 GROUP = "239.74.163.7"
 NODE = 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from canopen.profiles import p402
 from hypothesis import given
 from hypothesis import strategies as st
 from rtcomp_drivers.cia402_states import (
@@ -119,7 +120,6 @@ def test_a_statusword_tells_the_state_that_it_was_made_of():
 
 
 def test_statuswords_mean_what_canopen_reads_in_them():
-    p402 = pytest.importorskip("canopen.profiles.p402", reason="the extra 'can' is not installed")
     for word in range(1 << 16):
         theirs = [n for n, (mask, bits) in p402.State402.SW_MASK.items() if word & mask == bits]
         ours = state_of(word)
@@ -128,7 +128,6 @@ def test_statuswords_mean_what_canopen_reads_in_them():
 
 
 def test_controlwords_lead_where_canopen_has_them_lead():
-    p402 = pytest.importorskip("canopen.profiles.p402", reason="the extra 'can' is not installed")
     by_itself = {"START", "NOT READY TO SWITCH ON", "FAULT REACTION ACTIVE"}
     for (start, end), word in p402.State402.TRANSITIONTABLE.items():
         if start not in by_itself:
