@@ -23,7 +23,7 @@ from rtcomp.stage.simulate import Simulator, largest_step
 from rtcomp.stage.stage import Stage
 
 MIN_ROWS, MIN_SECONDS = 1000, 2.0
-"""All recordings together; below, no part is left that neither fitting nor selection sees."""
+"""All recordings together; below, no part can be left out of the fit."""
 GOOD_SECONDS = 20.0
 MIN_PIECE = 64
 """Rows of one recording: what the force balance needs."""

@@ -1,4 +1,4 @@
-"""How a whole stage does on the blocks of a recording that nothing was fitted to or chosen by."""
+"""How a whole stage does on the blocks of a recording that were left out of the fit."""
 
 from __future__ import annotations
 

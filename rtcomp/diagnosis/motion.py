@@ -33,7 +33,7 @@ FAINT = 0.02
 """Part of all that friction holds, that may be of reaches too long to be waited for."""
 BLOCKS = 24
 UNSEEN = (3, 9, 14, 20)
-"""Blocks that neither fitting nor selection sees."""
+"""Blocks that are left out of the fit; explanations that do not hold on them are rejected."""
 
 
 @dataclass(frozen=True)

@@ -114,7 +114,10 @@ class Named:
 
 @dataclass(frozen=True)
 class Fit:
-    """Relative force errors (rms over rms) on parts that neither fitting nor selection saw."""
+    """Relative force errors (rms over rms) on parts that were left out of the fit.
+
+    The choice between explanations may have used these parts (`holding`).
+    """
 
     before: float
     retuned: float
@@ -127,7 +130,7 @@ class Fit:
 class PositionFit:
     """Mean absolute errors of position (m) of a stage let go at points of the recording, driven as it was.
 
-    On windows of `seconds` that neither fitting nor selection saw.
+    On windows of `seconds` that were left out of the fit; the choice between explanations may have used them.
     """
 
     before: float

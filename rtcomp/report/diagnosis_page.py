@@ -136,7 +136,10 @@ def _gain(found: Diagnosis) -> Section:
     fit = found.fit
     prose = "Relative force error: the force that the balance leaves open, rms over the rms of the force."
     if len({fit.before, fit.retuned, fit.after}) > 1:
-        prose += " Measured on parts of the recordings that neither fitting nor selection saw."
+        prose += (
+            " Measured on parts of the recordings that were left out of the fit; the choice between "
+            "explanations may have used them."
+        )
     errors = {"as believed": fit.before, "retuned": fit.retuned, "extended": fit.after}
     return Section("How well it predicts", prose, fit_figure(errors, fit.floor))
 

@@ -66,7 +66,7 @@ class Windows:
         return self.rows * float(self.tracks[0].time[1] - self.tracks[0].time[0])
 
     def unseen_rows(self) -> list[np.ndarray]:
-        """Return which rows (K,) bool of each track neither fitting nor selection sees."""
+        """Return which rows (K,) bool of each track are left out of the fit."""
         found, before = [], 0
         for track in self.tracks:
             rows = before + np.arange(track.time.size)
@@ -94,7 +94,7 @@ class Windows:
 
     @property
     def seen(self) -> np.ndarray:
-        """Windows that fitting and selection may see, (W,) bool."""
+        """Windows that the fit uses, (W,) bool."""
         return ~np.isin(self.block, UNSEEN)
 
     def off(self, stage: Stage, which: np.ndarray | None = None) -> Floats:
