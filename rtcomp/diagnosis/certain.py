@@ -16,7 +16,7 @@ from rtcomp.diagnosis.base import BELIEVED, ENTRY_OF, FIXED, NUMBERS, Fitted, fi
 from rtcomp.diagnosis.blocks import Blocks
 from rtcomp.diagnosis.candidates import effect_of
 from rtcomp.diagnosis.cores import shared
-from rtcomp.diagnosis.departure import USUAL
+from rtcomp.diagnosis.departure import USUAL, believed_friction
 from rtcomp.diagnosis.extend import level_and_reach
 from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.refine import Knob, Refined, refine
@@ -24,7 +24,6 @@ from rtcomp.diagnosis.result import Retuned, Value
 from rtcomp.diagnosis.scene import Scene
 from rtcomp.diagnosis.typical import typical
 from rtcomp.kernels import Floats
-from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.stage.stage import Stage
 from rtcomp.units import for_axis
 
@@ -227,9 +226,7 @@ class Numbers:
             # What the entries' own numbers leave open, these do, as far as they make up for them.
             pulled = _pulled(believed, refined, values)
             spread = spread + np.einsum("ik,kl,il->i", pulled, covariance(refined), pulled)
-        friction = believed.friction
-        own = level_and_reach(friction.elements) if isinstance(friction, MaxwellSlip) else (0.0, 0.0)
-        before = np.array([m.mass, m.viscous, m.micro_damping, *own])
+        before = np.array([m.mass, m.viscous, m.micro_damping, *believed_friction(believed)])
         half = worse * np.sqrt(WIDE**2 * np.maximum(spread, 0.0) + grid**2 + (MODEL * values) ** 2)
         # What is held at its bound is so by the belief, not by the recording: its interval reaches back.
         held = np.zeros(values.size)

@@ -54,6 +54,11 @@ class Mechanics(Section):
     friction: Friction | None = None
     effects: list[EffectEntry] = Field(default_factory=list, description="what else is known to be there")
 
+    @field_validator("friction", mode="before")
+    @classmethod
+    def _empty_is_none(cls, value: Any) -> Any:
+        return None if value == [] else value
+
     @field_validator("friction")
     @classmethod
     def _friction_exists(cls, value: Any) -> Any:

@@ -137,7 +137,7 @@ def test_what_cannot_be_is_refused_with_file_line_and_key(old, new, at, holds, t
 
 
 @pytest.mark.parametrize(
-    "friction", ["[]", "{}", "stop", "3.0", "{model: leuwen}", "{model: cogging}", "{model: [1]}"]
+    "friction", ["{}", "stop", "3.0", "{model: leuwen}", "{model: cogging}", "{model: [1]}"]
 )
 def test_friction_that_is_none_is_refused(friction, tmp_path):
     lines = FORMATS.splitlines()
@@ -147,6 +147,14 @@ def test_friction_that_is_none_is_refused(friction, tmp_path):
         Stage.load(path)
     says = str(caught.value)
     assert says.startswith(f"{path}:9: ") and "friction" in says and "\n" not in says
+
+
+@pytest.mark.parametrize("friction", ["[]", "null"])
+def test_friction_may_be_empty(friction, tmp_path):
+    lines = FORMATS.splitlines()
+    text = "\n".join([*lines[:8], f"  friction: {friction}", *lines[11:]])
+    stage = Stage.load(written(tmp_path, text))
+    assert stage.friction is None and "friction" not in stage.to_dict()["stage"]
 
 
 @pytest.mark.parametrize(

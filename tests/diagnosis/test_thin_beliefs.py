@@ -1,0 +1,80 @@
+"""A belief of mass, force constant and voltage limit alone: friction is left to the diagnosis."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recorded import run, stage, there_and_back
+
+from rtcomp.diagnosis.admit import admit
+from rtcomp.diagnosis.base import fit_base
+from rtcomp.diagnosis.certain import Numbers, retunings
+from rtcomp.diagnosis.departure import believed_friction, departure, off
+from rtcomp.diagnosis.diagnose import diagnose
+from rtcomp.diagnosis.extend import extended_stage
+from rtcomp.diagnosis.motion import prepare
+from rtcomp.diagnosis.refine import refine
+from rtcomp.recording.reader import Recording, read
+from rtcomp.stage.stage import Stage
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+NEEDED = {"mass": 2.0, "force_constant": 4.0, "voltage_limit": 10.0}
+DEADBAND = {"name": "drive-deadband", "width": 0.2}
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    return run(stage(effects=[DEADBAND]), there_and_back())
+
+
+@pytest.mark.parametrize("friction", [{}, {"friction": []}], ids=["missing", "empty"])
+def test_numbers_that_are_not_believed_have_a_place_and_are_not_told(
+    recording: Recording, friction: dict[str, list[object]]
+) -> None:
+    thin = Stage.from_dict({"stage": NEEDED | friction, "rate": 1000.0})
+    assert thin.friction is None and believed_friction(thin) == (0.0, 0.0)
+    motion = prepare(thin, [recording])
+    fitted = fit_base(thin, motion, scales=(1.0,))
+    assert off(fitted).shape == (5,) and not off(fitted)[1:].any()
+    assert departure(fitted) == max(abs(float(off(fitted)[0])) - 1.0, 0.0) ** 2
+    refined = refine(fitted, motion, [dict(DEADBAND)], tries=2)
+    assert refined.away.shape == (5, len(refined.knobs))
+    extended = extended_stage(thin, refined.fitted, refined.entries)
+    numbers = Numbers.of(thin, refined, [], extended)
+    assert numbers.before.tolist() == [2.0, 0.0, 0.0, 0.0, 0.0]
+    assert np.all(np.isfinite(numbers.half))
+    assert {r.parameter for r in retunings(numbers, "linear")} <= {"mass"}
+
+
+def test_a_diagnosis_of_a_thin_belief_comes_to_its_end(recording: Recording) -> None:
+    thin = Stage.from_dict({"stage": NEEDED, "rate": 1000.0})
+    admit(thin, [recording])
+    found = diagnose(thin, [recording])
+    assert found.verdict in ("missing-physics", "unexplained")
+    assert found.fit.retuned < 0.3 * found.fit.before
+    assert {r.parameter for r in found.retuned} <= {"mass", "force_constant"}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not DATA.is_dir(), reason="measured and sealed recordings (../shared/data) are not here")
+def test_a_measured_motor_of_which_only_the_inertia_is_believed(tmp_path: Path) -> None:
+    """Open loop, 100 Hz; the position is the integral of the measured speed."""
+    source = DATA / "real" / "dc-motor" / "run_minimal.csv"
+    table = np.genfromtxt(source, delimiter=",", names=True, usecols=(0, 1, 2))
+    time, voltage, speed = table["time"], table["voltage"], table["rpm"] * 2.0 * np.pi / 60.0
+    position = np.append(0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time)))
+    np.savetxt(
+        tmp_path / "motor.csv", np.column_stack([time, position, voltage]), delimiter=",",
+        header="time,position,voltage", comments="",
+    )  # fmt: skip
+    thin = Stage.from_dict(
+        {"stage": {**NEEDED, "axis": "rotary", "mass": 0.01, "force_constant": 1.0, "voltage_limit": 12.0},
+         "rate": 100.0}
+    )  # fmt: skip
+    motor = replace(read(tmp_path / "motor.csv"), path=Path("motor.csv"))
+    admit(thin, [motor])
+    found = diagnose(thin, [motor])
+    assert found.verdict in ("missing-physics", "unexplained")
