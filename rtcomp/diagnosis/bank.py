@@ -17,8 +17,20 @@ from rtcomp.physics import Effect
 from rtcomp.physics.closing import ClosingBranches
 from rtcomp.physics.maxwell_slip import MaxwellSlip, stretched
 from rtcomp.physics.program import Program, renew, run_chain
+from rtcomp.physics.softening import softened
 from rtcomp.physics.speed import MicroDamping, ViscousFriction
-from rtcomp.physics.wires import COUNT, FRICTION, GRAIN, GRIP, GRIP_LEVEL, GRIP_STIFFNESS, MOVED, REACH, SCALE
+from rtcomp.physics.wires import (
+    COUNT,
+    FRICTION,
+    GRAIN,
+    GRIP,
+    GRIP_LEVEL,
+    GRIP_STIFFNESS,
+    MOVED,
+    REACH,
+    SCALE,
+    SOFTENS,
+)
 from rtcomp.stage.balance import along_row, around_rows, parts_of
 from rtcomp.stage.stage import Stage
 
@@ -112,10 +124,11 @@ def _along(
                 run_chain(steps, p, s, w, first + i, first + i + 1)
                 out[k, i] = w[FRICTION]
             held = out[k, SPEED_UNITS:]
-            moved, longer, scale = w[MOVED], w[REACH], w[SCALE]
+            moved, longer, scale, softening = w[MOVED], w[REACH], w[SCALE], w[SOFTENS]
             for i in range(count):
-                deflection[i] = stretched(deflection[i], moved, reaches[i] * longer)
-                held[i] = deflection[i] * scale
+                limit = reaches[i] * longer
+                deflection[i] = stretched(deflection[i], moved, limit)
+                held[i] = softened(deflection[i], limit, softening) * scale
             total = 0.0
             for i in range(count):
                 total += weights[i] * held[i]

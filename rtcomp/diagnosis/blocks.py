@@ -61,7 +61,7 @@ class Blocks:
         gram = gram + 1e-9 * np.trace(gram) / gram.shape[0] * np.eye(gram.shape[0])
         if bounds is None:
             return np.asarray(np.linalg.solve(gram, cross))
-        return _bounded(gram, cross, bounds.low * self.scale, bounds.high * self.scale)
+        return bounded_minimum(gram, cross, bounds.low * self.scale, bounds.high * self.scale)
 
     def errors(self, scaled: Floats, which: np.ndarray) -> Floats:
         """Return the squared error of `scaled` coefficients in each block of `which`."""
@@ -111,7 +111,7 @@ class Bounds:
 
 
 @compiled
-def _bounded(gram: Floats, cross: Floats, low: Floats, high: Floats) -> Floats:
+def bounded_minimum(gram: Floats, cross: Floats, low: Floats, high: Floats) -> Floats:
     """Minimise c' G c / 2 - h' c within bounds by an active set (Portugal, Judice, Vicente 1994).
 
     The set changes as a whole at first and by single members when that would cycle.

@@ -63,6 +63,12 @@ def curves(motion: Motion, final: Fitted, entries: Sequence[Entry], axis: str) -
     return found
 
 
+def curve_of(looked: Sequence[Axis], entry: Entry, force: Floats, without: Floats) -> Curve:
+    """Return the curve of an `entry`: its `force` and what is left `without` it (N, (n,)) on an axis."""
+    waves = [a for a in looked if a.name == "position"] if "period" in entry else looked
+    return _along(waves, force, without, entry.get("period"))
+
+
 def _own(looked: Sequence[Axis], entry: Entry) -> list[Axis]:
     """Return the axes that an entry may be drawn along: those of its own, where it has such."""
     if "period" in entry:

@@ -9,8 +9,8 @@ import numpy as np
 
 from rtcomp.control.reference_settings import reference_settings
 from rtcomp.control.references import build_reference, check
-from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.result import Experiment
+from rtcomp.diagnosis.view import View
 from rtcomp.errors import RtcompError
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.simulate import on_reference
@@ -20,7 +20,7 @@ from rtcomp.yamlfile import YamlFile
 SECONDS = 20.0
 
 
-def manoeuvres(motion: Motion) -> dict[str, dict[str, Any]]:
+def manoeuvres(motion: View) -> dict[str, dict[str, Any]]:
     """Return reference sections that stay within the recorded stroke (m), by what they are."""
     low, high = motion.stroke
     half, middle = 0.5 * (high - low), 0.5 * (high + low)
@@ -48,7 +48,7 @@ def manoeuvres(motion: Motion) -> dict[str, dict[str, Any]]:
     }  # fmt: skip
 
 
-def next_experiment(one: Stage, other: Stage, names: tuple[str, str], motion: Motion) -> Experiment | None:
+def next_experiment(one: Stage, other: Stage, names: tuple[str, str], motion: View) -> Experiment | None:
     """Return the manoeuvre in which two stages differ most in what would be measured; None if none runs.
 
     Both are simulated in closed loop; the difference counts in position against the sensor's noise and in
@@ -79,7 +79,7 @@ def next_experiment(one: Stage, other: Stage, names: tuple[str, str], motion: Mo
     return Experiment(best[2], names, seconds, best[1])
 
 
-def _run(stage: Stage, path: np.ndarray, motion: Motion) -> dict[str, np.ndarray]:
+def _run(stage: Stage, path: np.ndarray, motion: View) -> dict[str, np.ndarray]:
     data = {**stage.to_dict(), "rate": motion.rate}
     config = Configuration.of(YamlFile(data, Path("stage")))
     return on_reference(config, path, float(path[0])).columns

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rtcomp.diagnosis.along_position import Wave, wave
-from rtcomp.diagnosis.motion import Motion
 from rtcomp.diagnosis.result import Place
+from rtcomp.diagnosis.view import View
 from rtcomp.kernels import Floats
 from rtcomp.units import for_axis, prefixed
 
@@ -83,7 +83,7 @@ class Binned:
         return explained / max(float(residual @ residual), 1e-300)
 
 
-def axes_of(motion: Motion, axis: str = "linear") -> list[Axis]:
+def axes_of(motion: View, axis: str = "linear") -> list[Axis]:
     """Return position, speed, direction, command, acceleration, time, time and distance since reversal."""
     unit = for_axis("m", axis)
     speed, push, since, way = [], [], [], []
@@ -128,7 +128,7 @@ def _since_reversal(moving: Floats, position: Floats, period: float) -> tuple[Fl
 
 
 def locate(
-    motion: Motion, before: Floats, after: Floats | None, seed: int = 0, axis: str = "linear"
+    motion: View, before: Floats, after: Floats | None, seed: int = 0, axis: str = "linear"
 ) -> list[Place]:
     """Return where the residual `before` (N, kept rows) shows, largest share first; `after` to compare.
 
@@ -254,7 +254,7 @@ def _says(axis: Axis, region: tuple[float, float], share: float, mean: Floats, s
     return f"{part}, most of it between {low} and {high} {unit}".rstrip()
 
 
-def _line(motion: Motion, before: Floats, after: Floats | None) -> Place | None:
+def _line(motion: View, before: Floats, after: Floats | None) -> Place | None:
     """Return a line in the residual's spectrum, where one stands out."""
     rate = motion.rate / motion.thinning
     size = before.size

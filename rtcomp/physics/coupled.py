@@ -174,6 +174,7 @@ class Backlash(Effect):
     experiment = "slow reversals, and strokes of several sizes around the play"
     example = {"gap": 2e-5}
     neutral = {"gap": 0.0}
+    behind = True
     order = 70
     states = 2
 

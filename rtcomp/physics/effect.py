@@ -38,7 +38,8 @@ What modifies friction acts on every model of the catalogue through these wires:
 by MOVED only, speed by VELOCITY less LATE, its level by REACH, its size by SCALE, its curvature by SOFTENS.
 
 What a search for a missing effect needs to know stands here too, and nowhere by name: `linear` parameters,
-`neutral` values, `searchable`, `search_grid`, `whole_friction`, `moving_mass`, `steady`, `bias`, `stands_for`
+`neutral` values, `searchable`, `search_grid`, `whole_friction`, `moving_mass`, `behind`, `steady`, `bias`,
+`stands_for`,
 `Parameter.physical_low` and `Parameter.held`. Each has its sentence at `Effect`; the defaults do for most.
 
 To feed an effect forward, there are two ways, and its place says which:
@@ -166,6 +167,8 @@ class Effect:
     no longer a sum of what single friction elements do."""
     moving_mass: ClassVar[bool] = False
     """Whether it sets the moving mass or couples part of it elastically: a share of the stage's own."""
+    behind: ClassVar[bool] = False
+    """Whether friction and part of the mass are behind it, on a load with a motion of its own (a play)."""
     steady: ClassVar[bool] = False
     """Of the drive: whether its force stays as it is while the command is held. Forces beside the drive's,
     such as cogging's, do not count."""

@@ -1,0 +1,228 @@
+"""From the chosen model to the answer: verdict, names, numbers, stage, and what was left open."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtcomp.diagnosis.certain import Numbers, all_by_one_factor, force_constant, retunings
+from rtcomp.diagnosis.curves import left_over
+from rtcomp.diagnosis.experiment import next_experiment
+from rtcomp.diagnosis.extend import with_forces
+from rtcomp.diagnosis.locate import locate
+from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
+from rtcomp.diagnosis.second import entries as ent
+from rtcomp.diagnosis.second.balance import ForceBalance
+from rtcomp.diagnosis.second.confidence import Alternatives
+from rtcomp.diagnosis.second.detectability import sights
+from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.diagnosis.second.intervals import Told, numbers, told
+from rtcomp.diagnosis.second.selection import Search
+from rtcomp.diagnosis.second.settings import LEAST_GAIN, LEFT, LEVEL, TOLERANCE
+from rtcomp.diagnosis.second.stage_of import stage_of
+from rtcomp.diagnosis.second.validation import Reserved
+from rtcomp.diagnosis.second.where import Compared, as_force, curves
+from rtcomp.errors import ConfigError, RtcompError
+from rtcomp.stage.stage import Stage
+from rtcomp.units import for_axis, prefixed
+
+UNEXPLAINED = ("unexplained",)
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What the chosen model leaves beyond noise."""
+
+    significant: bool
+    """More than its replicates leave, and more than every model is wrong by."""
+    share: float
+    """Part of the baseline's error above the noise."""
+    worse: float
+    """Error over that of replicates (rms), at least 1: how far the model is from the physics."""
+
+    @classmethod
+    def of(cls, balance: ForceBalance, found: Search) -> Rest:
+        """Measure it against the replicates of the chosen model."""
+        error, first = float(found.chosen.errors.sum()), float(found.baseline.errors.sum())
+        relative = math.sqrt(error / max(balance.power, 1e-300))
+        if found.null is None:
+            return cls(relative > TOLERANCE, 1.0 if not found.chosen.terms else error / first, 1.0)
+        noise = float(np.median(found.null.errors))
+        significant = found.null.p_of_error(error) < LEVEL and relative > TOLERANCE
+        share = max(error - noise, 0.0) / max(first - noise, 1e-300)
+        return cls(significant, min(share, 1.0), max(1.0, math.sqrt(error / noise)))
+
+
+def answer(
+    believed: Stage,
+    fitter: Fitter,
+    found: Search,
+    sets: Sequence[Alternatives],
+    reserved: Reserved,
+    seed: int,
+) -> Diagnosis:
+    """Return the diagnosis that a search ends in."""
+    balance, base, chosen = fitter.balance, found.baseline, found.chosen
+    rest = Rest.of(balance, found)
+    spans = told(balance, chosen, rest.worse)
+    solid = [not t.nothing and not t.bound for t in spans]
+    nearest = rest.significant and rest.share > LEFT
+    notes = _notes(balance, chosen, spans, nearest)
+    shares = _shares(base, chosen, sets)
+    named = [] if nearest or not all(solid) else _named(balance, chosen, spans, sets, shares, rest)
+    final = chosen if named else base
+    view = Compared(balance)
+    before, after = as_force(balance, base.residual), as_force(balance, final.residual)
+    if rest.significant or (chosen.terms and not named):
+        left = locate(view, after, None, seed, believed.axis)
+        part = rest.share if named else 1.0
+        named.append(Named(UNEXPLAINED, 1.0, {}, part, curve=left_over(left)))
+    tuned = numbers(balance, believed, final, rest.worse)
+    stages, moved = _stages(believed, balance, base, final, tuned, bool(named))
+    verdict, matters = _verdict(named, balance, believed, base, moved)
+    if not matters:
+        stages["after"] = stages["retuned"] = believed
+    errors = reserved.judge({"before": believed, **stages})
+    fit = Fit(errors["before"], errors["retuned"], errors["after"], errors["noise"])
+    where = (
+        [] if verdict == "consistent" else locate(view, before, after if named else None, seed, believed.axis)
+    )
+    seen = sights(fitter, final, found.null)
+    names = {n for e in named for n in e.names}
+    return Diagnosis(
+        verdict,
+        where,
+        moved if verdict != "consistent" else [],
+        named,
+        fit,
+        [s.name for s in seen if not s.seen and s.name not in names],
+        stages["after"],
+        _experiment(balance, chosen, sets, named, view),
+        seen,
+        [Candidate(n, _part(g), _z(p), True) for n, g, p in found.screened],
+        notes,
+        view.plain([s.time for s in view.strips]),
+        before,
+        after,
+        balance.reserved[balance.block].astype(np.float64),
+    )
+
+
+def _part(gain: float) -> float:
+    return max(1.0 - math.exp(-gain), 0.0)
+
+
+def _z(p: float) -> float:
+    from scipy.stats import norm
+
+    return float(norm.isf(min(max(p, 1e-300), 1.0 - 1e-12))) if math.isfinite(p) else math.nan
+
+
+def _shares(base: Fitted, chosen: Fitted, sets: Sequence[Alternatives]) -> list[float]:
+    """Return the part of the mismatch that each effect explains: by what its absence would leave."""
+    lost = [float(chosen.errors.sum()) * (1.0 / max(1.0 - s.gain, 1e-12) - 1.0) for s in sets]
+    explained = 1.0 - float(chosen.errors.sum() / base.errors.sum())
+    total = sum(lost) or 1.0
+    return [explained * one / total for one in lost]
+
+
+def _named(
+    balance: ForceBalance,
+    chosen: Fitted,
+    spans: Sequence[Told],
+    sets: Sequence[Alternatives],
+    shares: Sequence[float],
+    rest: Rest,
+) -> list[Named]:
+    drawn = curves(balance, chosen)
+    found = []
+    for one, span, share, curve in zip(sets, spans, shares, drawn, strict=True):
+        sure = one.probability * (1.0 - (rest.share if rest.significant else 0.0))
+        apart = ""
+        if len(one.names) > 1:
+            apart = "; ".join(f"{n}: {ent.kind_of({'name': n}).experiment}" for n in one.names)
+        found.append(Named(one.names, sure, span.values, float(np.clip(share, 0.0, 1.0)), apart, curve))
+    return sorted(found, key=lambda e: -e.share)
+
+
+def _stages(
+    believed: Stage, balance: ForceBalance, base: Fitted, final: Fitted, tuned: Numbers, named: bool
+) -> tuple[dict[str, Stage], list[Retuned]]:
+    """Return the retuned and the extended stage, and the numbers of the belief that moved."""
+    stages = {"retuned": stage_of(balance, base), "after": stage_of(balance, final)}
+    moved = retunings(tuned, believed.axis)
+    factor = None if named or believed.mechanics.effects else all_by_one_factor(tuned)
+    if factor is not None:
+        stages = {name: with_forces(stage, 1.0 / factor[0]) for name, stage in stages.items()}
+        moved = [force_constant(believed, *factor)]
+    return stages, moved + _found(believed, tuned)
+
+
+def _found(believed: Stage, tuned: Numbers) -> list[Retuned]:
+    """Return the friction that a belief without any lacks."""
+    if believed.friction is not None:
+        return []
+    keys = (("viscous", "N s/m", 1), ("friction.level", "N", 3), ("friction.reach", "m", 4))
+    found = []
+    for key, unit, i in keys:
+        value, half = float(tuned.values[i]), float(tuned.half[i])
+        if tuned.before[i] == 0.0 and value > half:
+            told = Value(value, max(value - half, 0.0), value + half, for_axis(unit, believed.axis))
+            found.append(Retuned(key, 0.0, told))
+    return found
+
+
+def _verdict(
+    named: Sequence[Named], balance: ForceBalance, believed: Stage, base: Fitted, moved: Sequence[Retuned]
+) -> tuple[Verdict, bool]:
+    """Return the verdict, and whether other numbers than the believed ones are given."""
+    if any(e.names != UNEXPLAINED for e in named):
+        return "missing-physics", True
+    drive, needed = balance.both_sides(believed)
+    rows = ~balance.reserved[balance.block]
+    as_believed = float(np.mean((drive - needed)[rows] ** 2))
+    retuned = float(np.mean(as_force(balance, base.residual)[rows] ** 2))
+    better = math.sqrt(retuned) < (1.0 - LEAST_GAIN) * math.sqrt(as_believed)
+    relative = math.sqrt(as_believed / max(float(np.mean(drive[rows] ** 2)), 1e-300))
+    matters = bool(moved) and better and relative > TOLERANCE
+    if named:
+        return "unexplained", matters
+    return ("retuned", True) if matters else ("consistent", False)
+
+
+def _notes(balance: ForceBalance, chosen: Fitted, spans: Sequence[Told], nearest: bool) -> list[str]:
+    notes = [f"frequencies count by signal to noise, up to {balance.noise.bandwidth:.3g} Hz"]
+    names = ent.names(chosen.entries)
+    if nearest and names:
+        notes.append(f"nearest, but too much is left: {', '.join(names)}")
+    for name, span in zip(names, spans, strict=True):
+        if span.bound:
+            notes.append(f"{name} is not named: {', '.join(span.bound)} came out at its bound")
+        elif span.nothing:
+            notes.append(f"{name} is not named: its size may be nothing")
+    (low, high), unit = prefixed(for_axis("m", balance.stage.axis), *balance.data.stroke)
+    if names and not nearest:
+        notes.append(f"known from {low} to {high} {unit}, where this motion went, and not beyond")
+    return notes
+
+
+def _experiment(
+    balance: ForceBalance,
+    chosen: Fitted,
+    sets: Sequence[Alternatives],
+    named: Sequence[Named],
+    view: Compared,
+) -> Experiment | None:
+    """Return the motion that tells apart what this one does not, None where there is nothing to."""
+    for one in sets:
+        if len(one.names) < 2 or not any(e.names == one.names for e in named):
+            continue
+        try:
+            stages = [stage_of(balance, m) for m in one.models[:2]]
+            return next_experiment(stages[0], stages[1], (one.names[0], one.names[1]), view)
+        except (ConfigError, RtcompError):
+            return None
+    return None

@@ -1,0 +1,53 @@
+"""The baseline: the belief refitted, its friction on yield displacements that the recording asks for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rtcomp.diagnosis.second.balance import BASE, ForceBalance
+from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.kernels import Floats
+
+DENSE = 64
+"""Yield displacements that are tried at first, over the whole range."""
+FINER = 3
+"""Times finer they stand around those found, in the second try."""
+SLIGHT = 1e-3
+"""Part of the friction level below which a unit is not needed."""
+
+
+def baseline(balance: ForceBalance) -> Fitted:
+    """Whiten `balance`, settle its grid of yield displacements, and return the refitted belief.
+
+    Stiffnesses that must not be negative come out sparse: of a dense grid, a dozen units are not zero. These
+    are kept beside the believed ones and a coarse grid, so that candidates find friction that can give way.
+    """
+    m = balance.stage.mechanics
+    believed = np.array([m.mass, m.viscous, m.micro_damping, *balance.weights])
+    fitter = Fitter(balance)
+    balance.whiten(believed)
+    coarse = balance.reaches
+    step = float(np.log(coarse[-1] / coarse[0])) / (DENSE - 1)
+    dense = np.geomspace(coarse[0], coarse[-1], DENSE)
+    for _ in range(2):
+        balance.put(dense, step)
+        fitted = fitter.fit([])
+        balance.whiten(fitted.coefficients)
+        kept = _needed(balance, fitter.fit([]))
+        step /= FINER
+        around = np.exp(np.log(kept)[:, None] + step * np.arange(1 - FINER, FINER)[None, :]).ravel()
+        dense = np.unique(around[(around >= coarse[0]) & (around <= coarse[-1])])
+        if not kept.size:
+            break
+    skeleton = coarse[::2]
+    far = np.array([not kept.size or np.min(np.abs(np.log(kept / r))) > step * FINER for r in skeleton])
+    balance.put(np.concatenate([kept, skeleton[far]]), step * FINER)
+    fitted = fitter.fit([])
+    balance.whiten(fitted.coefficients)
+    return fitter.fit([])
+
+
+def _needed(balance: ForceBalance, fitted: Fitted) -> Floats:
+    """Return the yield displacements of a fit that hold a part of the friction."""
+    force = fitted.coefficients[len(BASE) : balance.size] * balance.reaches
+    return balance.reaches[force > SLIGHT * max(float(force.sum()), 1e-300)]

@@ -1,0 +1,339 @@
+"""Candidates: every effect of the catalogue, at starting values that the units of its parameters give.
+
+A parameter's unit gives its scale on this recording: a length goes from the sensor's grain to the stroke, a
+speed over those of the motion, a voltage over those of the command, a time from a row to the length of the
+recording, a frequency to half the rate; periods and frequencies of waves come from periodograms of the
+residual. An effect needs to say nothing more; where a parameter has no unit, it states start values.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.periodogram import highest, periodogram
+from rtcomp.diagnosis.second import entries as ent
+from rtcomp.diagnosis.second.balance import BASE, ForceBalance
+from rtcomp.diagnosis.second.entries import Entry
+from rtcomp.diagnosis.second.fit import Fitted, Term
+from rtcomp.diagnosis.second.where import as_force
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats
+from rtcomp.physics import Effect, Parameter, catalogue
+
+POINTS = 5
+"""Start values of a nonlinear parameter."""
+PEAKS = 3
+"""Peaks taken of a periodogram."""
+SMALL = 0.05
+"""Size of a dimensionless parameter at which its first-order effect is looked at."""
+POINT = 1e-2
+"""Relative size of a step that is taken to be first order."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An entry at a point of its parameters, and what the model changes by with its sizes, (q, n)."""
+
+    term: Term
+    parts: tuple[Entry, ...]
+    """Entries whose changes are the columns: unit sizes, quarter periods, or the entry itself."""
+    columns: Floats
+    low: Floats
+    high: Floats
+    """Bounds of the sizes, (q,) each."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return str(self.term.entry["name"])
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What a recording offers to each unit."""
+
+    length: tuple[float, float]
+    stroke: tuple[float, float]
+    speed: Floats
+    volts: Floats
+    time: tuple[float, float]
+    frequency: tuple[float, float]
+    periods: Floats
+    tones: Floats
+    moments: Floats
+
+    @classmethod
+    def of(cls, balance: ForceBalance, fitted: Fitted) -> Scales:
+        """Measure them on the compared rows and on the residual of a fit."""
+        data, paths = balance.data, balance.paths()
+        v = np.abs(balance.plain([p.v for p in paths]))
+        u = np.abs(balance.plain([s.voltage for s in data.segments]))
+        low, high = data.stroke
+        quantiles = np.linspace(0.1, 0.9, POINTS)
+        moving = v[v > 1e-3 * v.max()] if v.max() > 0 else v
+        slow, fast = (max(float(np.quantile(moving, q)), 1e-12) for q in (0.02, 0.9))
+        speed = np.geomspace(slow, fast, POINTS)
+        rest = fitted.residual * np.isin(balance.block, np.flatnonzero(~balance.reserved))
+        return cls(
+            (max(2.0 * balance.grain, 1e-5 * (high - low)), 0.5 * (high - low)),
+            (low, high),
+            speed,
+            np.unique(np.quantile(u[u > 0], quantiles)) if np.any(u > 0) else np.ones(1),
+            (data.period, 0.5 * data.seconds),
+            (4.0 / data.seconds, 0.4 * data.rate),
+            _periods(balance, rest),
+            _tones(balance, rest),
+            _moments(balance, rest),
+        )
+
+    def of_parameter(self, p: Parameter, kind: type[Effect]) -> Sequence[float]:
+        """Return the start values of a nonlinear parameter, within its bounds."""
+        found = self._of_parameter(p, kind)
+        return [float(x) for x in found if p.lowest <= x <= p.high and not (p.open_low and x == p.low)]
+
+    def _of_parameter(self, p: Parameter, kind: type[Effect]) -> list[float]:
+        waves = any(q.unit == ent.PHASE for q in kind.parameters)
+        if p.name in kind.search_grid:
+            return list(kind.search_grid[p.name])
+        if p.choice:
+            return [p.low, p.high]
+        if p.name == ent.PERIOD:
+            return _listed(self.periods)
+        if p.name == ent.MOMENT:
+            return _listed(self.moments)
+        if p.unit == "Hz" and waves:
+            return _listed(self.tones)
+        if p.unit == "m" and p.low < 0.0:
+            return _listed(np.linspace(*self.stroke, 2 * POINTS + 3)[1:-1])
+        found = self._of_unit(p.unit.removeprefix("1/"))
+        if found is not None:
+            return [1.0 / value for value in found] if p.unit.startswith("1/") else found
+        return [float(kind.example.get(p.name, 1.0))]
+
+    def _of_unit(self, unit: str) -> list[float] | None:
+        """Return the values that a unit takes on this recording, None of a unit without scale."""
+        found = {
+            "m": np.geomspace(*self.length, POINTS + 1),
+            "m/s": self.speed,
+            "V": self.volts,
+            "s": np.geomspace(*self.time, POINTS + 1)[:-1],
+            "Hz": np.geomspace(*self.frequency, 2 * POINTS),
+        }.get(unit)
+        return None if found is None else _listed(found)
+
+
+def _listed(values: Floats) -> list[float]:
+    return [float(value) for value in values]
+
+
+def searchable(balance: ForceBalance) -> Iterator[type[Effect]]:
+    """Go through what may be missing; not what stands for a number of the belief, which is refitted."""
+    for kind in catalogue.entries():
+        if kind.searchable and (not kind.stands_for or _denied(balance, kind.stands_for)):
+            yield kind
+
+
+def _denied(balance: ForceBalance, number: str) -> bool:
+    return number in BASE and balance.without(number)
+
+
+def candidates(balance: ForceBalance, fitted: Fitted, taken: Sequence[str] = ()) -> list[Candidate]:
+    """Return every candidate beside a fitted model, with the columns it would add to it."""
+    scales = Scales.of(balance, fitted)
+    work = [
+        (kind, point)
+        for kind in searchable(balance)
+        if kind.name not in taken
+        for point in _points(kind, scales, balance)
+    ]
+    made = shared(lambda item: _candidate(balance, fitted, *item), work)
+    return [c for c in made if c is not None]
+
+
+def _points(kind: type[Effect], scales: Scales, balance: ForceBalance) -> Iterator[tuple[Entry, str]]:
+    """Go through entries at start values, and the linear parameter looked at ("" for the entry as is)."""
+    rotary = balance.stage.axis == "rotary"
+    own = [p for p in kind.parameters if rotary or p.unit != "N m"]
+    for form in list(kind.forms) or [""]:
+        base: Entry = {"name": kind.name, **({"form": form} if form else {})}
+        base.update({p.name: ent.neutral(kind, p.name) for p in own if p.name in kind.linear})
+        nonlinear = [p for p in own if p.name not in kind.linear and _searched(kind, p)]
+        looked = [""] if ent.adds_force(kind) else [n for n in kind.linear if n in base] or [""]
+        for linear in looked:
+            # What only a wave has stays out of a slope.
+            moved = [p for p in nonlinear if _of_linear(kind, p, linear)]
+            still = {p.name: (scales.of_parameter(p, kind) or [0.0])[0] for p in nonlinear if p not in moved}
+            ranges = [
+                _phases(kind, base) if p.unit == ent.PHASE else scales.of_parameter(p, kind) for p in moved
+            ]
+            for values in itertools.product(*ranges):
+                yield {**base, **still, **dict(zip([p.name for p in moved], values, strict=True))}, linear
+
+
+def _searched(kind: type[Effect], p: Parameter) -> bool:
+    return p.default is None or p.unit == ent.PHASE or p.name in kind.search_grid
+
+
+def _of_linear(kind: type[Effect], p: Parameter, linear: str) -> bool:
+    """Tell whether a nonlinear parameter matters to the force of a linear one."""
+    waves = any(q.unit == ent.PHASE for q in kind.parameters)
+    only = p.unit == ent.PHASE or p.name == ent.PERIOD
+    return not (waves and only) or not linear or _waves_of(kind, linear)
+
+
+def _phases(kind: type[Effect], entry: Entry) -> list[float]:
+    """Return the phases to start from: one where quarter periods do for the rest."""
+    if not ent.adds_force(kind) or ent.waves(kind, {**entry, **{p.name: 0.0 for p in kind.parameters}}):
+        return [0.0]
+    return [float(a) for a in np.linspace(0.0, np.pi, 4, endpoint=False)]
+
+
+def _waves_of(kind: type[Effect], linear: str) -> bool:
+    return linear == "amplitude" and any(p.unit == ent.PHASE for p in kind.parameters)
+
+
+def _candidate(
+    balance: ForceBalance, fitted: Fitted, kind: type[Effect], point: tuple[Entry, str]
+) -> Candidate | None:
+    """Make a candidate: columns of free size, or what the model changes by with the entry at work."""
+    entry, linear = point
+    try:
+        if ent.adds_force(kind):
+            parts = ent.basis(entry)
+            columns = balance.forces_of([*fitted.entries, entry])
+            return _finite(Candidate(Term.of(entry), tuple(parts), columns, *ent.bounds_of(entry)))
+        if not linear:
+            change = _change(balance, fitted, entry)[None, :]
+            return _finite(Candidate(Term.of(entry), (entry,), change, np.zeros(1), np.full(1, np.inf)))
+        p = ent.parameter(kind, linear)
+        step = _step(p, balance)
+        phases = [p.name for p in kind.parameters if p.unit == ent.PHASE]
+        if _waves_of(kind, linear):
+            parts = [{**entry, linear: step, phases[0]: angle} for angle in (0.0, 0.5 * np.pi)]
+            free = frozenset(q.name for q in kind.parameters if q.name in entry and q.name not in kind.linear)
+            term = Term(entry, free | {linear})
+            low, high = np.full(2, -p.high / step), np.full(2, p.high / step)
+        else:
+            parts = [{**entry, linear: step}]
+            dead = {p.name for p in kind.parameters if p.unit == ent.PHASE or p.name == ent.PERIOD}
+            own = {p.name for p in kind.parameters if p.name in entry}
+            term = Term(entry, frozenset(own - set(kind.linear) - (dead if phases else set())) | {linear})
+            low, high = (
+                np.array([(p.lowest - entry[linear]) / step]),
+                np.array([(p.high - entry[linear]) / step]),
+            )
+        columns = np.array([_change(balance, fitted, part) for part in parts])
+        return _finite(Candidate(term, tuple(parts), columns, low, high))
+    except ConfigError:
+        return None
+
+
+def _finite(candidate: Candidate) -> Candidate | None:
+    """Return the candidate where its columns are finite and not all nothing."""
+    power = float(np.sum(candidate.columns**2))
+    return candidate if np.isfinite(power) and power > 0.0 else None
+
+
+def started(candidate: Candidate, sizes: Floats) -> Term:
+    """Return the term to fit from: the candidate with the sizes that the screening found."""
+    entry = candidate.term.entry
+    kind = ent.kind_of(entry)
+    if ent.adds_force(kind):
+        return candidate.term
+    moved = {n for part in candidate.parts for n in part if part[n] != entry[n]}
+    if not moved:
+        return candidate.term
+    out = dict(entry)
+    phases = [p.name for p in kind.parameters if p.unit == ent.PHASE]
+    if len(candidate.parts) == 2:
+        name = next(n for n in moved if n not in phases)
+        step = float(candidate.parts[0][name])
+        most = 0.9 * ent.parameter(kind, name).high
+        out[name] = min(float(np.hypot(*sizes)) * step, most)
+        out[phases[0]] = float(np.arctan2(sizes[1], sizes[0]))
+    else:
+        name = next(iter(moved))
+        p = ent.parameter(kind, name)
+        neutral = float(entry[name])
+        value = neutral + float(sizes[0]) * (float(candidate.parts[0][name]) - neutral)
+        out[name] = min(max(value, 0.9 * p.lowest), 0.9 * p.high)
+    return candidate.term.with_entry(out)
+
+
+def _step(p: Parameter, balance: ForceBalance) -> float:
+    """Return a size of a linear parameter that is first order and above rounding."""
+    data = balance.data
+    volts = float(np.sqrt(np.mean(np.concatenate([s.voltage for s in data.segments]) ** 2)))
+    low, high = data.stroke
+    scale = {
+        "m": POINT * (high - low),
+        "s": data.period,
+        "V": SMALL * volts,
+        "1": SMALL,
+        "1/m": SMALL / (high - low),
+    }
+    force = balance.stage.force_constant * volts
+    forces = {"N": force, "N s/m": force / max(high - low, 1e-12)}
+    size = scale.get(p.unit, SMALL * forces.get(p.unit, 1.0))
+    if p.unit == "m":
+        size = max(3.0 * balance.noise.rms, 1e-4 * (high - low))
+    return min(size, 0.5 * p.high)
+
+
+def _change(balance: ForceBalance, fitted: Fitted, entry: Entry) -> Floats:
+    """Return by how much more force the model accounts for with an entry at work, (n,), coefficients held."""
+    return fitted.residual - balance.error([*fitted.entries, entry], fitted.coefficients, fitted.weights)
+
+
+def _periods(balance: ForceBalance, residual: Floats) -> Floats:
+    """Return periods (m) of waves along the position, in the residual as force and as displacement."""
+    low, high = balance.data.stroke
+    paths = balance.paths()
+    x = balance.plain([p.x for p in paths])
+    v = balance.plain([p.v for p in paths])
+    u = balance.plain([s.voltage for s in balance.data.segments])
+    force = as_force(balance, residual)
+    span = high - low
+    step = float(np.median(np.abs(np.diff(x)))) or span / 1000.0
+    most = float(np.clip(span / max(2.0 * step, 4.0 * balance.grain, 1e-4 * span), 4.0, 1500.0))
+    found: list[float] = []
+    for weight, of in (
+        (np.ones_like(x), force),
+        (np.sign(v), force),
+        (u, force),
+        (np.ones_like(x), residual),
+    ):
+        n, power = periodogram(x, span, weight, of, most)
+        some = n >= 0.8
+        found += [span / k for k in highest(n[some], power[some], PEAKS, 0.05)]
+    periods = np.sort(np.array(found))
+    return np.asarray(periods[np.concatenate([[True], np.diff(np.log(periods)) > 0.02])])
+
+
+def _tones(balance: ForceBalance, residual: Floats) -> Floats:
+    """Return frequencies (Hz) of the strongest lines of the residual in time."""
+    rate = balance.data.rate / balance.whitening.thinning
+    size = residual.size
+    power = np.abs(np.fft.rfft(residual * np.hanning(size), 4 * size)) ** 2
+    frequency = np.asarray(np.arange(power.size) * (rate / (4 * size)), dtype=np.float64)
+    some = (frequency > 3.0 * rate / size) & (frequency < 0.45 * rate)
+    lines: list[float] = highest(frequency[some], np.asarray(power[some], dtype=np.float64), PEAKS + 2, 0.01)
+    return np.sort(np.array(lines))
+
+
+def _moments(balance: ForceBalance, residual: Floats) -> Floats:
+    """Return times (s) of the largest whitened residuals, apart from each other."""
+    time = balance.plain([s.time for s in balance.data.segments])
+    left, found = np.abs(residual), []
+    apart = max(10, residual.size // 500)
+    for _ in range(PEAKS):
+        at = int(np.argmax(left))
+        found.append(float(time[at]))
+        left = left.copy()
+        left[max(at - apart, 0) : at + apart + 1] = 0.0
+    return np.sort(found)

@@ -1,0 +1,116 @@
+"""What a recording cannot tell apart: the model confidence set of the chosen model and its neighbours."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.second import entries as ent
+from rtcomp.diagnosis.second.candidates import candidates, started
+from rtcomp.diagnosis.second.fit import Fitted, Fitter, Term
+from rtcomp.diagnosis.second.replicates import best, free_columns
+from rtcomp.diagnosis.second.screening import Screen
+from rtcomp.diagnosis.second.selection import Search
+from rtcomp.diagnosis.second.settings import ALIAS
+from rtcomp.diagnosis.second.significance import confidence_set, log_gain, probabilities
+from rtcomp.errors import ConfigError
+
+SET_LEVEL = 0.05
+"""Level of the confidence set."""
+NEAR = 0.5
+"""Part of the best screened gain from which on a candidate is fitted in another's place."""
+
+
+@dataclass(frozen=True)
+class Alternatives:
+    """One effect of the chosen model and what could stand in its place."""
+
+    term: Term
+    names: tuple[str, ...]
+    """All that cannot be told apart, likeliest first."""
+    probability: float
+    """That the truth is among them, if it is among all that was fitted."""
+    gain: float
+    """Squared error that the effect takes away, over that of the chosen model without it."""
+    models: tuple[Fitted, ...]
+    """The models of `names` in that order."""
+
+
+def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternatives]:
+    """Return the chosen effects, each with its set; stops looking at the time `ends`."""
+    chosen = found.chosen
+    done = []
+    for i, term in enumerate(chosen.terms):
+        rest = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
+        others = _others(fitter, found, i, rest, ends)
+        models = [chosen, *others]
+        errors = [m.errors for m in models]
+        members = set(confidence_set(errors, SET_LEVEL))
+        best_gain = log_gain(rest.errors, chosen.errors)
+        members |= {
+            k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= (1.0 - ALIAS) * best_gain
+        }
+        members.add(0)
+        rows = float(np.mean(np.bincount(fitter.balance.block)))
+        weight = probabilities(errors, rows)
+        order = sorted(members, key=lambda k: (-weight[k], k))
+        names = [_replaced(models[k], chosen, i) for k in order]
+        kept = [j for j, n in enumerate(names) if n not in names[:j]]
+        gain = 1.0 - float(chosen.errors.sum() / rest.errors.sum())
+        done.append(
+            Alternatives(
+                term,
+                tuple(names[j] for j in kept),
+                float(min(sum(weight[k] for k in order), 1.0)),
+                gain,
+                tuple(models[order[j]] for j in kept),
+            )
+        )
+    return done
+
+
+def _replaced(model: Fitted, chosen: Fitted, at: int) -> str:
+    """Return the name that stands in the place of the chosen model's effect."""
+    if model is chosen:
+        return str(chosen.terms[at].entry["name"])
+    return str(model.terms[-1].entry["name"])
+
+
+def _others(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -> list[Fitted]:
+    """Return models with another effect in the place of one of the chosen."""
+    chosen = found.chosen
+    name = chosen.terms[at].entry["name"]
+    kept = sorted(ent.names(rest.entries))
+    known = [
+        m
+        for m in found.alternatives
+        if sorted(ent.names(m.entries)[:-1]) == kept and m.terms[-1].entry["name"] != name
+    ]
+    if known or time.monotonic() > ends:
+        return known
+    balance = fitter.balance
+    made = candidates(balance, rest, [*ent.names(rest.entries), str(name)])
+    screened = Screen(made, balance.block, balance.blocks, fitter.use).gains(
+        free_columns(rest), rest.residual
+    )
+    least = NEAR * log_gain(rest.errors, chosen.errors)
+    tried = [
+        k for k in best([c.name for c in made], [s.gain for s in screened], 3) if screened[k].gain > least
+    ]
+    return _fitted(fitter, rest, [started(made[k], screened[k].sizes) for k in tried], ends)
+
+
+def _fitted(fitter: Fitter, rest: Fitted, terms: Sequence[Term], ends: float) -> list[Fitted]:
+    def fit(term: Term) -> Fitted | None:
+        if time.monotonic() > ends:
+            return None
+        try:
+            return fitter.fit([*rest.terms, term], rest)
+        except (ConfigError, np.linalg.LinAlgError):
+            return None
+
+    return [m for m in shared(fit, terms) if m is not None]

@@ -1,0 +1,105 @@
+"""Recordings as the diagnosis sees them: segments of equal rate, and how the command goes between rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rtcomp.diagnosis.stretches import LEAST_ROWS, stretches
+from rtcomp.kernels import Floats
+from rtcomp.recording.pieces import bridged
+from rtcomp.recording.reader import Recording
+
+MOST_ROWS = 120_000
+"""Rows of the recording that are used as they are; of longer ones windows are taken, evenly spread."""
+WINDOWS = 6
+"""Windows of a long recording."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One uninterrupted part: time (s), position (m), voltage (V), reference (m) or None; each (K,)."""
+
+    time: Floats
+    position: Floats
+    voltage: Floats
+    reference: Floats | None
+
+    def part(self, rows: slice) -> Segment:
+        """Return some of its rows."""
+        reference = None if self.reference is None else self.reference[rows]
+        return Segment(self.time[rows], self.position[rows], self.voltage[rows], reference)
+
+
+@dataclass(frozen=True)
+class Data:
+    """Segments at one rate (Hz); `held` tells whether the command is held from row to row or band-limited."""
+
+    segments: tuple[Segment, ...]
+    rate: float
+    held: bool
+
+    @property
+    def period(self) -> float:
+        """Time between rows (s)."""
+        return 1.0 / self.rate
+
+    @property
+    def stroke(self) -> tuple[float, float]:
+        """Lowest and highest position (m)."""
+        lows, highs = zip(*[(s.position.min(), s.position.max()) for s in self.segments], strict=True)
+        return float(min(lows)), float(max(highs))
+
+    @property
+    def seconds(self) -> float:
+        """Length of all segments (s)."""
+        return float(sum(s.time.size for s in self.segments)) / self.rate
+
+    def with_input(self, *, held: bool) -> Data:
+        """Return the same recordings with the command between rows taken to be held, or band-limited."""
+        return replace(self, held=held)
+
+
+def load_data(recordings: Sequence[Recording], *, held: bool = True) -> Data:
+    """Return the recordings (of one rate) as segments: without long gaps, windows of very long ones."""
+    rate = recordings[0].rate_hz
+    found = [s for r in recordings for s in _segments(r)]
+    rows = sum(s.time.size for s in found)
+    if rows > MOST_ROWS:
+        size = MOST_ROWS // WINDOWS
+        share = max(WINDOWS // len(found), 1)
+        found = [w for s in found for w in _windows(s, share, size)]
+    return Data(tuple(found), rate, held)
+
+
+def _segments(recording: Recording) -> list[Segment]:
+    position = bridged(recording.position, recording.trusted)
+    time = recording.time - recording.time[0]
+    whole = Segment(time, position, recording.voltage, recording.reference)
+    found = [whole.part(rows) for rows in stretches(recording.trusted)]
+    return [s for s in found if s.time.size >= LEAST_ROWS // 2] or [whole]
+
+
+def _windows(segment: Segment, count: int, rows: int) -> list[Segment]:
+    if segment.time.size <= count * rows:
+        return [segment]
+    starts = np.linspace(0, segment.time.size - rows, count).astype(np.int64)
+    return [segment.part(slice(k, k + rows)) for k in starts.tolist()]
+
+
+def reversals(position: Floats) -> int:
+    """Return how often a position (m) turns back by more than a fiftieth of its range."""
+    reach = 0.02 * float(np.ptp(position))
+    count, way = 0, 0
+    low = high = float(position[0])
+    for value in position[:: max(1, position.size // 20_000)].tolist():
+        low, high = min(low, value), max(high, value)
+        if way <= 0 and value > low + reach:
+            count += way < 0
+            way, high, low = 1, value, value
+        elif way >= 0 and value < high - reach:
+            count += way > 0
+            way, low, high = -1, value, value
+    return count

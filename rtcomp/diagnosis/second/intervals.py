@@ -1,0 +1,144 @@
+"""Intervals of what a fit found, by leaving blocks out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtcomp.diagnosis.certain import Numbers, elsewhere, scatter
+from rtcomp.diagnosis.extend import level_and_reach
+from rtcomp.diagnosis.result import Value
+from rtcomp.diagnosis.second import entries as ent
+from rtcomp.diagnosis.second.balance import BASE, ForceBalance
+from rtcomp.diagnosis.second.fit import ONCE, Fitted
+from rtcomp.kernels import Floats
+from rtcomp.stage.stage import Stage
+from rtcomp.units import for_axis
+
+MODEL = 2e-3
+"""Relative error of a number that equations of motion in rows of the recording leave in any case."""
+AT_BOUND = 1e-3
+"""Part of its range within which a number is at its bound."""
+
+
+@dataclass(frozen=True)
+class Told:
+    """An entry's numbers with their intervals, and what of them makes it no finding."""
+
+    values: dict[str, Value]
+    nothing: bool
+    """Every size of it may be neutral."""
+    bound: tuple[str, ...]
+    """Parameters that are at a physical bound."""
+
+
+def told(balance: ForceBalance, fitted: Fitted, worse: float) -> list[Told]:
+    """Return the 95 % intervals of each term's parameters, widened by `worse`.
+
+    Blocks of the recording are left out in turn (delete-a-group jackknife: Bell and McCaffrey 2002, Survey
+    Methodology 28(2)); what a single block tells is compared with the rest of the recording.
+    """
+    from scipy.stats import t as student
+
+    spans = fitted.system.of_entry[len(balance.believed) :]
+    factor = float(student.ppf(0.975, max(fitted.without.shape[0] - 1, 1)))
+    axis = balance.stage.axis
+    found = []
+    for i, (term, span) in enumerate(zip(fitted.terms, spans, strict=True)):
+        kind = ent.kind_of(term.entry)
+        without, once = _without(fitted, i, span), _once(balance, fitted, i, span)
+        values, neutral, bound = {}, [], []
+        for p in kind.parameters:
+            if p.name not in term.entry:
+                continue
+            value = float(term.entry[p.name])
+            half = 0.0
+            if p.name in without:
+                apart = without[p.name] - value
+                if p.unit == ent.PHASE:
+                    apart = (apart + np.pi) % (2.0 * np.pi) - np.pi
+                sd = float(np.sqrt(max(scatter(apart[:, None])[0, 0], 0.0)))
+                size = 2.0 if p.unit == ent.PHASE else abs(value)
+                half = worse * math.hypot(factor * max(sd, once.get(p.name, 0.0)), MODEL * size)
+                if _at_bound(value, p.lowest, p.high):
+                    bound.append(p.name)
+            elif p.name == ent.MOMENT:
+                half = balance.data.period
+            low, high = max(value - half, p.low), min(value + half, p.high)
+            values[p.name] = Value(value, low, high, for_axis(p.unit, axis))
+            if p.name in kind.linear and p.name in without:
+                neutral.append(low <= ent.neutral(kind, p.name) <= high)
+        found.append(Told(values, bool(neutral) and all(neutral), tuple(bound)))
+    return found
+
+
+def _at_bound(value: float, low: float, high: float) -> bool:
+    near = AT_BOUND * (high - low) if high - low <= 10.0 else AT_BOUND * abs(value)
+    return value >= high - near or (low > 0.0 and value <= low + near)
+
+
+def _without(fitted: Fitted, at: int, span: slice) -> dict[str, Floats]:
+    """Return the values (B,) of each free parameter of a term without each block."""
+    term = fitted.terms[at]
+    size = fitted.coefficients.size
+    found: dict[str, Floats] = {}
+    if span.stop > span.start:
+        made = [ent.composed(term.entry, c[span]) for c in fitted.without]
+        moved = [n for n in made[0] if n in term.free and isinstance(made[0][n], float)]
+        found.update({n: np.array([m[n] for m in made]) for n in moved})
+    for k, free in enumerate(fitted.free):
+        if free.term != at:
+            continue
+        values = free.get(fitted.terms) + fitted.without[:, size + k]
+        found[free.name] = np.exp(np.minimum(values, 700.0)) if free.log else values
+    return found
+
+
+def _once(balance: ForceBalance, fitted: Fitted, at: int, span: slice) -> dict[str, float]:
+    """Return standard deviations of numbers that one block alone tells."""
+    use = np.isin(balance.block, np.flatnonzero(~balance.reserved))
+    block, rest = balance.block[use], fitted.residual[use]
+    found: dict[str, float] = {}
+
+    def alone(column: Floats) -> bool:
+        power = np.bincount(block, column**2, balance.blocks)
+        return bool(power.max() > ONCE * max(float(power.sum()), 1e-300))
+
+    own = [n for n in ent.kind_of(fitted.terms[at].entry).linear if n in fitted.terms[at].entry]
+    for name, column in zip(own, fitted.system.columns[span], strict=False):
+        if alone(column[use]):
+            found[name] = math.sqrt(elsewhere(column[use], rest))
+    for free, tangent in zip(fitted.free, fitted.tangents, strict=True):
+        if free.term == at and alone(tangent[use]):
+            sd = math.sqrt(elsewhere(tangent[use], rest))
+            found[free.name] = sd * (float(fitted.terms[at].entry[free.name]) if free.log else 1.0)
+    return found
+
+
+def numbers(balance: ForceBalance, believed: Stage, fitted: Fitted, worse: float) -> Numbers:
+    """Return mass, damping, level and reach of friction, believed and found, with their half widths."""
+    from scipy.stats import t as student
+
+    reaches = balance.reaches
+
+    def of(c: Floats) -> Floats:
+        elements = list(zip(c[len(BASE) : balance.size], reaches, strict=True))
+        return np.array([*c[: len(BASE)], *level_and_reach(elements)])
+
+    values = of(fitted.coefficients)
+    sets = np.array([of(c) for c in fitted.without])
+    spread = np.maximum(np.diag(scatter(sets)), 0.0)
+    factor = float(student.ppf(0.975, max(sets.shape[0] - 1, 1)))
+    half = worse * np.sqrt(factor**2 * spread + (MODEL * values) ** 2)
+    m = believed.mechanics
+    before = np.array([m.mass, m.viscous, m.micro_damping, *_friction(believed)])
+    return Numbers(before, values, half, np.zeros(values.size))
+
+
+def _friction(stage: Stage) -> Sequence[float]:
+    from rtcomp.diagnosis.departure import believed_friction
+
+    return believed_friction(stage)

@@ -1,0 +1,88 @@
+"""The diagnosis from top to bottom: data, objective, baseline, candidates, test, search, set, judgement."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from rtcomp.diagnosis.locate import locate
+from rtcomp.diagnosis.result import Diagnosis, Place
+from rtcomp.diagnosis.second.answer import answer
+from rtcomp.diagnosis.second.balance import ForceBalance
+from rtcomp.diagnosis.second.baseline import baseline
+from rtcomp.diagnosis.second.confidence import alternatives
+from rtcomp.diagnosis.second.data import load_data
+from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.diagnosis.second.selection import search
+from rtcomp.diagnosis.second.settings import BUDGET
+from rtcomp.diagnosis.second.significance import log_gain
+from rtcomp.diagnosis.second.validation import Reserved
+from rtcomp.diagnosis.second.where import Compared, as_force
+from rtcomp.errors import RtcompError
+from rtcomp.recording.reader import Recording
+from rtcomp.stage.stage import Stage
+
+Progress = Callable[[float, str], None]
+Located = Callable[[float, Sequence[Place]], None]
+"""Told, before anything is named, what part of the force the refitted stage leaves open (rms), and where."""
+
+
+def diagnose(
+    stage: Stage,
+    recordings: Sequence[Recording],
+    *,
+    held: bool | None = None,
+    budget: float = BUDGET,
+    progress: Progress | None = None,
+    located: Located | None = None,
+    seed: int = 0,
+) -> Diagnosis:
+    """Say where `stage` and `recordings` (of one rate) differ, what is missing, and what it explains.
+
+    `held` tells whether the command is held from row to row or goes on between rows as a band-limited
+    signal; None where both are to be tried. `budget` (s) ends the search with the best answer so far.
+    `progress` hears how far each step is, `located` the places of the mismatch before anything is named.
+    Raises RtcompError where the budget does not do for the baseline.
+    """
+    say: Progress = progress or (lambda _part, _what: None)
+    ends = time.monotonic() + budget
+    say(0.0, "balance")
+    balance, base, notes = _objective(stage, recordings, held)
+    if time.monotonic() > ends:
+        raise RtcompError(f"the budget of {budget:g} s ended before the stage was refitted; give it more")
+    view = Compared(balance)
+    before = as_force(balance, base.residual)
+    if located is not None:
+        left = (base.sse / max(balance.power, 1e-300)) ** 0.5
+        located(left, locate(view, before, None, seed, stage.axis))
+    fitter = Fitter(balance)
+    say(1.0, "balance")
+    found = search(fitter, base, ends, say, seed)
+    say(0.0, "tell apart")
+    sets = alternatives(fitter, found, ends)
+    say(0.5, "judge")
+    done = answer(stage, fitter, found, sets, Reserved(balance), seed)
+    say(1.0, "judge")
+    notes += [f"not tried within {budget:g} s: {what}" for what in found.not_tried]
+    return replace(done, notes=[*notes, *done.notes])
+
+
+def _objective(
+    stage: Stage, recordings: Sequence[Recording], held: bool | None
+) -> tuple[ForceBalance, Fitted, list[str]]:
+    """Return the force balance and the refitted stage, with the command taken as it fits best."""
+    ways = [True, False] if held is None else [held]
+    made = []
+    for way in ways:
+        balance = ForceBalance(stage, load_data(recordings, held=way))
+        made.append((balance, baseline(balance)))
+    if len(made) == 1:
+        return (*made[0], [])
+    scaled = [fitted.errors / balance.power for balance, fitted in made]
+    gain = log_gain(scaled[0], scaled[1])
+    chosen = 1 if gain > 0.0 else 0
+    balance, fitted = made[chosen]
+    if chosen == 0:
+        return balance, fitted, []
+    return balance, fitted, ["the command is taken as band-limited between rows, which fits better than held"]

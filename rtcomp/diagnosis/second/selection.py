@@ -1,0 +1,220 @@
+"""The search: forward with a full refit, a few models kept at a time, backward after each step."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.second import entries as ent
+from rtcomp.diagnosis.second.balance import ForceBalance
+from rtcomp.diagnosis.second.candidates import Candidate, candidates, started
+from rtcomp.diagnosis.second.fit import Fitted, Fitter, Term
+from rtcomp.diagnosis.second.replicates import best, free_columns, null_of
+from rtcomp.diagnosis.second.screening import Screen, Screened
+from rtcomp.diagnosis.second.settings import BEAM, FULL_FITS, LEAST_GAIN, LEVEL, MOST_EFFECTS
+from rtcomp.diagnosis.second.significance import Null, log_gain
+from rtcomp.errors import ConfigError
+
+SCANNED = 14
+"""Values of a length that are tried where first order is no guide."""
+
+Say = Callable[[float, str], None]
+
+
+@dataclass
+class Search:
+    """What the search did: models by number of effects, nulls, what it had no time for."""
+
+    baseline: Fitted
+    chosen: Fitted
+    null: Null | None = None
+    """Of the chosen model."""
+    alternatives: list[Fitted] = field(default_factory=list)
+    """Models with one entry of the chosen one replaced by another effect."""
+    screened: list[tuple[str, float, float]] = field(default_factory=list)
+    """Name, gain and p-value of each candidate beside the baseline."""
+    not_tried: list[str] = field(default_factory=list)
+
+
+def search(fitter: Fitter, baseline: Fitted, ends: float, say: Say, seed: int = 0) -> Search:
+    """Return the best model that the one test accepts; stops at the time `ends` (time.monotonic)."""
+    found = Search(baseline, baseline)
+    everything = float(baseline.errors.sum())
+    beam, parents = [baseline], {id(baseline): everything}
+    grown: list[Fitted] = []
+    for step in range(MOST_EFFECTS + 1):
+        look = None
+        while beam and look is None:
+            look = _sound(_look(fitter.balance, beam[0], seed + step, say), parents[id(beam[0])])
+            if look is None:
+                beam.pop(0)
+        if look is None or look.null is None:
+            break
+        null = look.null
+        found.chosen, found.null = beam[0], null
+        found.alternatives = [g for g in grown if len(g.terms) == len(beam[0].terms) and g is not beam[0]]
+        if step == 0:
+            found.screened = _table(look.candidates, look.screened, null)
+        if step == MOST_EFFECTS or null.settled(look.gain, float(beam[0].errors.sum()), LEVEL):
+            break
+        grown = _grow(fitter, beam[0], look.candidates, look.screened, ends)
+        for other in beam[1:] if null.p_value(look.gain) < LEVEL else []:
+            if time.monotonic() > ends:
+                break
+            beside = _look(fitter.balance, other, None, say)
+            grown += _grow(fitter, other, beside.candidates, beside.screened, ends)
+        if time.monotonic() > ends:
+            others = " and ".join(ent.names(found.chosen.entries))
+            found.not_tried.append(f"all further effects beside {others or 'the belief'}")
+        accepted = [g for g in grown if _accepted(g, _parent(g, beam), null, everything)]
+        accepted = _distinct(sorted(accepted, key=_score))[:BEAM]
+        parents = {}
+        next_beam = []
+        for model in accepted:
+            smaller = _pruned(fitter, model, null, everything)
+            parents[id(smaller)] = float(_parent(model, beam).errors.sum())
+            next_beam.append(smaller)
+        beam = [m for m in _distinct(sorted(next_beam, key=_score)) if _score(m) < _score(found.chosen)]
+        if not beam:
+            break
+    return found
+
+
+@dataclass(frozen=True)
+class _Look:
+    """All candidates beside a model, their gains, the null distribution where it was asked for."""
+
+    candidates: list[Candidate]
+    screened: list[Screened]
+    null: Null | None
+
+    @property
+    def gain(self) -> float:
+        """The largest gain."""
+        return max(s.gain for s in self.screened)
+
+
+def _look(balance: ForceBalance, model: Fitted, seed: int | None, say: Say) -> _Look:
+    names = ent.names(model.entries)
+    say(0.0, f"beside {' and '.join(names)}" if names else "search")
+    made = candidates(balance, model, names)
+    screen = Screen(made, balance.block, balance.blocks, ~balance.reserved)
+    screened = screen.gains(free_columns(model), model.residual)
+    gain = max(s.gain for s in screened)
+    say(0.5, f"beside {' and '.join(names)}" if names else "search")
+    null = None if seed is None else null_of(balance, model, screen, gain, seed)
+    return _Look(made, screened, null)
+
+
+def _sound(look: _Look, parent: float) -> _Look | None:
+    """Return the look where its model can be judged.
+
+    A model that explains recordings of its own no better than the one before explains the real recording has
+    shown nothing: it put the drive's force on both sides of the balance.
+    """
+    if look.null is None or float(np.median(look.null.errors)) > parent:
+        return None
+    return look
+
+
+def _grow(
+    fitter: Fitter, model: Fitted, made: Sequence[Candidate], screened: Sequence[Screened], ends: float
+) -> list[Fitted]:
+    """Return the model with each of the best candidates, fitted in full."""
+    chosen = best([c.name for c in made], [s.gain for s in screened], FULL_FITS)
+    terms = [started(made[i], screened[i].sizes) for i in chosen]
+    # First order is no guide to what is behind a play: its own motion is followed from place to place.
+    behind = {c.name: c.term for c in made if ent.kind_of(c.term.entry).behind}
+    terms = [t for t in terms if t.entry["name"] not in behind]
+    terms += [t for t in (_scanned(fitter, model, term, ends) for term in behind.values()) if t is not None]
+
+    def fit(term: Term) -> Fitted | None:
+        if time.monotonic() > ends:
+            return None
+        try:
+            return fitter.fit([*model.terms, term], model)
+        except (ConfigError, np.linalg.LinAlgError):
+            return None
+
+    return [f for f in shared(fit, terms) if f is not None]
+
+
+def _scanned(fitter: Fitter, model: Fitted, term: Term, ends: float) -> Term | None:
+    """Return the term at the length at which a model with it fits best; None where none fits better."""
+    name = next(p.name for p in ent.free_parameters(term.entry, linear=False) if p.unit == "m")
+    low, high = fitter.balance.data.stroke
+    grid = np.geomspace(2.0 * fitter.balance.grain, 0.25 * (high - low), SCANNED)
+
+    def error(value: float) -> float:
+        if time.monotonic() > ends:
+            return np.inf
+        entry = {**term.entry, name: value}
+        try:
+            return fitter.quick([*model.terms, term.with_entry(entry)])
+        except (ConfigError, np.linalg.LinAlgError):
+            return np.inf
+
+    for _ in range(2):
+        errors = shared(error, grid.tolist())
+        at = int(np.argmin(errors))
+        if errors[at] >= model.sse:
+            return None
+        value = float(grid[at])
+        grid = np.geomspace(grid[max(at - 1, 0)], grid[min(at + 1, grid.size - 1)], SCANNED // 2)
+    return term.with_entry({**term.entry, name: value})
+
+
+def _accepted(model: Fitted, parent: Fitted, null: Null | None, everything: float) -> bool:
+    """Tell whether the last effect of a model passes the one test and matters."""
+    if null is None:
+        return False
+    p = null.p_value(log_gain(parent.errors, model.errors))
+    gained = np.sqrt(parent.errors.sum()) - np.sqrt(model.errors.sum())
+    return p < LEVEL and bool(gained > LEAST_GAIN * np.sqrt(everything))
+
+
+def _parent(model: Fitted, beam: Sequence[Fitted]) -> Fitted:
+    names = ent.names(model.entries)[:-1]
+    return next(b for b in beam if ent.names(b.entries) == names)
+
+
+def _pruned(fitter: Fitter, model: Fitted, null: Null | None, everything: float) -> Fitted:
+    """Return the model without effects that no longer pass the test beside the others."""
+    while len(model.terms) > 1:
+        smaller = [
+            fitter.fit([*model.terms[:i], *model.terms[i + 1 :]], model) for i in range(len(model.terms))
+        ]
+        rest = [s for s in smaller if not _accepted(model, s, null, everything)]
+        if not rest:
+            return model
+        model = min(rest, key=_score)
+    return model
+
+
+def _score(model: Fitted) -> float:
+    return float(np.mean(np.log(model.errors)))
+
+
+def _distinct(models: Sequence[Fitted]) -> list[Fitted]:
+    found: list[Fitted] = []
+    for m in models:
+        if all(sorted(ent.names(m.entries)) != sorted(ent.names(f.entries)) for f in found):
+            found.append(m)
+    return found
+
+
+def _table(
+    made: Sequence[Candidate], screened: Sequence[Screened], null: Null | None
+) -> list[tuple[str, float, float]]:
+    order = best([c.name for c in made], [s.gain for s in screened], len(made))
+    return [
+        (made[i].name, screened[i].gain, null.p_value(screened[i].gain) if null else float("nan"))
+        for i in order
+    ]
+
+
+__all__ = ["Search", "Term", "search"]

@@ -1,0 +1,43 @@
+"""All numbers that decide, with what each trades."""
+
+LEVEL = 0.01
+"""Level of the one test: share of recordings with nothing missing in which an effect is named."""
+
+LEAST_GAIN = 0.02
+"""Minimum part of the initial rms error that an effect must remove. Below it an effect may be real, but does
+not matter: every model is wrong in the fourth digit."""
+
+REPLICATES = 19
+"""Bootstrap replicates behind the null distribution: more make its tail surer and the answer later."""
+
+BEAM = 3
+"""Models kept at each step of the search: more find effects that hide each other, and cost time."""
+
+FULL_FITS = 6
+"""Candidates refitted in full at each step, best of the screening first."""
+
+MOST_EFFECTS = 4
+"""Effects that a model may have beside the belief."""
+
+BLOCK_SECONDS, BLOCK_REVERSALS = 2.0, 3
+"""Least length (s) and reversals of a block, where the recording has enough: shorter blocks are not
+independent, longer ones are few."""
+
+RESERVED_EVERY = 5
+"""Every how manieth block is reserved for the final judgement."""
+
+BELIEF_SD = 0.2
+"""Prior standard deviation of a believed number, relative to it."""
+
+ALIAS = 0.01
+"""Part of the best candidate's gain that another may lack and still not be told apart from it."""
+
+LEFT = 0.2
+"""Part of the initial error above the noise floor (squared), from which on the names are the nearest, not
+the right ones."""
+
+TOLERANCE = 0.01
+"""Relative force error up to which a model agrees with a recording, whatever the sensor's noise."""
+
+BUDGET = 60.0
+"""Time (s) after which the search ends with the best answer so far."""

@@ -1,0 +1,89 @@
+"""From a fitted model to a stage in the belief's own format."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rtcomp.diagnosis.second import entries as ent
+from rtcomp.diagnosis.second.balance import BASE, ForceBalance
+from rtcomp.diagnosis.second.entries import Entry
+from rtcomp.diagnosis.second.fit import Fitted
+from rtcomp.kernels import Floats
+from rtcomp.stage.stage import Stage
+
+SLIGHT = 1e-6
+"""Part of the largest yield force below which a friction unit is left out."""
+
+
+def stage_of(balance: ForceBalance, fitted: Fitted, *, between: bool = False) -> Stage:
+    """Return the believed stage with the fit's numbers, and the fit's entries among its effects.
+
+    `between` shares out friction that is not believed to places between those of the grid: as the recording's
+    own friction, it is then not quite within reach of a fit on the grid.
+    """
+    c = fitted.coefficients
+    data = balance.stage.to_dict()
+    mechanics: dict[str, Any] = data["stage"]
+    for key, value in zip(BASE, c, strict=False):
+        mechanics[key] = float(max(value, 0.0))
+    stiffness, reaches = c[len(BASE) : balance.size], balance.reaches
+    if between:
+        stiffness, reaches = _between(balance, stiffness)
+    level = stiffness * reaches
+    force = float(np.sqrt(np.mean(np.concatenate([s.voltage for s in balance.data.segments]) ** 2)))
+    least = SLIGHT * max(float(level.max()), force * balance.stage.force_constant)
+    units = [
+        {"stiffness": float(k), "reach": float(r)}
+        for k, r, f in zip(stiffness, reaches, level, strict=True)
+        if f > least
+    ]
+    mechanics.pop("friction", None)
+    if units:
+        mechanics["friction"] = units
+    believed: list[Entry] = []
+    at = iter(fitted.system.of_entry)
+    refitted = {id(e): next(at) for e in balance.believed}
+    by_content = {repr(e): refitted[id(e)] for e in balance.believed}
+    for entry in mechanics.get("effects", []):
+        span = by_content.get(repr(dict(entry)))
+        believed.append(dict(entry) if span is None else ent.composed(entry, c[span]))
+    effects = merged([*believed, *fitted.entries])
+    mechanics["effects"] = effects
+    if not effects:
+        del mechanics["effects"]
+    return Stage.from_dict(data)
+
+
+def _between(balance: ForceBalance, stiffness: Floats) -> tuple[Floats, Floats]:
+    """Return stiffnesses (N/m) and reaches (m) of units halfway between those of the grid, same forces."""
+    reaches = balance.reaches
+    grid = ~np.isin(reaches, balance.believed_reaches)
+    away = np.exp(0.5 * balance.step)
+    below, above = reaches[grid] / away, reaches[grid] * away
+    half = 0.5 * stiffness[grid] * reaches[grid]
+    made = np.concatenate([reaches[~grid], below, above])
+    stiff = np.concatenate([stiffness[~grid], half / below, half / above])
+    order = np.argsort(made)
+    return stiff[order], made[order]
+
+
+def merged(effects: Sequence[Entry]) -> list[Entry]:
+    """Return effects, those of one name that differ in linear parameters only added up."""
+    found: list[Entry] = []
+    for entry in effects:
+        kind = ent.kind_of(entry)
+        plain = ent.adds_force(kind) and bool(kind.linear) and set(entry) <= {"name", *kind.linear}
+        same = next(
+            (e for e in found if plain and e["name"] == entry["name"] and set(e) <= {"name", *kind.linear}),
+            None,
+        )
+        if same is None:
+            found.append(dict(entry))
+            continue
+        for name in kind.linear:
+            if name in entry or name in same:
+                same[name] = float(same.get(name, 0.0)) + float(entry.get(name, 0.0))
+    return found
