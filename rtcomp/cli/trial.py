@@ -6,6 +6,7 @@ import math
 import os
 import shlex
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,8 @@ from rtcomp.cli.output import prepare_output
 from rtcomp.cli.runs import to_json
 
 if TYPE_CHECKING:
+    from rich.table import Table as RichTable
+
     from rtcomp.trial.figures import Figure
     from rtcomp.trial.trial import Trial
 
@@ -27,6 +30,26 @@ if TYPE_CHECKING:
     "--only",
     type=click.Choice(["one", "two", "outside", "clean", "retuned"]),
     help="Cases of this kind and no others: false alarms of one in a hundred take hundreds of clean ones.",
+)
+@click.option(
+    "--family",
+    "families",
+    metavar="NAME",
+    multiple=True,
+    help="Cases of this family of axes; may be given several times. Default all, each with the same weight.",
+)
+@click.option(
+    "--forms",
+    metavar="SHARE",
+    type=click.FloatRange(0.0, 1.0),
+    help="Share of effects hidden in another form, of those that have one; by default that of the family.",
+)
+@click.option(
+    "--method",
+    type=click.Choice(["first", "second"]),
+    default="first",
+    show_default=True,
+    help="Of diagnosis, as `rtcomp diagnose` has it.",
 )
 @click.option(
     "--resume", metavar="DIR", type=click.Path(path_type=Path),
@@ -48,6 +71,9 @@ def trial(
     cases: int,
     seed: int,
     only: str | None,
+    families: tuple[str, ...],
+    forms: float | None,
+    method: str,
     resume: Path | None,
     out: Path,
     force: bool,
@@ -60,10 +86,10 @@ def trial(
 ) -> None:
     """Prove the diagnosis on cases whose answers are sealed until it is done.
 
-    Plants, hidden effects, noise and beliefs are drawn by a simulator that shares no physics with the
-    program; answers are committed to, diagnoses run in processes of their own, and only then are answers
-    opened and scored. Leaves trial.json, rows.csv, commitments.json and answers.json. A trial that is
-    interrupted says where it is kept; --resume goes on from there.
+    Plants of several families, hidden effects, noise and beliefs are drawn by a simulator that shares no
+    physics with the program; answers are committed to, diagnoses run in processes of their own, and only
+    then are answers opened and scored. Leaves trial.json, rows.csv, commitments.json and answers.json. A
+    trial that is interrupted says where it is kept; --resume goes on from there.
 
     \b
     Example:
@@ -76,14 +102,16 @@ def trial(
     from rtcomp.trial.trial import trial as run
 
     here = (sys.executable, "-m", "rtcomp.cli.main")
-    diagnose = tuple(shlex.split(command)) if command else (*here, "diagnose")
     chosen = tuple(RIVALS) if rivals == "all" else ()
+    families = known_families(families)
     if resume is not None:
         so_far = Stopped.read(resume)
         cases, seed, only = so_far.cases, so_far.seed, so_far.only
+        families, forms, method = tuple(so_far.families), so_far.forms, so_far.method
     settings = Settings(
-        cases, seed, jobs or os.cpu_count() or 1, diagnose, (*here, "replay"), timeout, chosen, only
-    )
+        cases, seed, jobs or os.cpu_count() or 1, diagnosis_command(method, command), (*here, "replay"),
+        timeout, chosen, only, families, forms, method,
+    )  # fmt: skip
     with prepare_output(out, force) as work, Progress("trial", quiet=as_json) as bar:
         done = run(
             settings, work, lambda step, n, of: bar.update(n / of, {step: f"{n} of {of}"}), keep, resume
@@ -93,6 +121,41 @@ def trial(
         click.echo(to_json({**content, "out": str(out)}))
         return
     _show(done, out)
+
+
+def known_families(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the families of these names, all where there are none; raise RtcompError for an unknown one."""
+    from rtcomp.errors import RtcompError, nearest
+    from rtcomp.trial.families import FAMILIES
+
+    for name in names:
+        if name not in FAMILIES:
+            raise RtcompError(f"no family is named {name!r}; {nearest(name, list(FAMILIES))}")
+    return tuple(names) or tuple(FAMILIES)
+
+
+def diagnosis_command(method: str, command: str | None = None) -> tuple[str, ...]:
+    """Return the command that diagnoses by `method`, recording, stage and output still to be added.
+
+    Where `rtcomp diagnose` has no such method, raise RtcompError. A `command` of one's own is told of any
+    method but the first.
+    """
+    from rtcomp.cli.diagnose import diagnose
+    from rtcomp.errors import RtcompError
+
+    if command:
+        return (*shlex.split(command), *(("--method", method) if method != "first" else ()))
+    own = (sys.executable, "-m", "rtcomp.cli.main", "diagnose")
+    option = next((p for p in diagnose.params if p.name == "method"), None)
+    if option is None:
+        if method != "first":
+            raise RtcompError(f"rtcomp diagnose has no method {method!r} yet; there is only the first")
+        return own
+    if isinstance(option.type, click.Choice) and method not in option.type.choices:
+        raise RtcompError(
+            f"rtcomp diagnose has no method {method!r}; there is {', '.join(option.type.choices)}"
+        )
+    return (*own, "--method", method)
 
 
 def _show(done: Trial, out: Path) -> None:
@@ -113,6 +176,9 @@ def _show(done: Trial, out: Path) -> None:
         )  # fmt: skip
     console = Console(width=None if sys.stdout.isatty() else 140)
     console.print(table)
+    if len(done.families) > 1:
+        console.print(_by_family(done))
+    console.print(_stated(done))
     for tier in done.seen:
         if tier.cases:
             console.print(
@@ -122,6 +188,51 @@ def _show(done: Trial, out: Path) -> None:
     for note in done.notes:
         console.print(f"Note: {note}", markup=False)
     console.print(f"{done.seconds:.0f} s; rows in {out / 'rows.csv'}, all in {out / 'trial.json'}")
+
+
+SHOWN = {
+    "right, all cases": "right",
+    "named first, one effect": "one: first",
+    "false name beside one effect": "one: false name",
+    "both of two named": "both of two",
+    "false alarm on clean": "clean: alarm",
+    "outside called unexplained": "outside: unexplained",
+    "outside misnamed": "outside: name",
+}
+"""Figures that the table of families shows, and their headings."""
+
+
+def _by_family(done: Trial) -> RichTable:
+    from rich.table import Table
+
+    from rtcomp.trial.figures import figures
+
+    table = Table(title="By family: percent (cases)", title_justify="left")
+    table.add_column("family", no_wrap=True)
+    for heading in ("cases", *SHOWN.values()):
+        table.add_column(heading, justify="right")
+    for name, rows in done.families.items():
+        found = {f.name: f for f in figures(rows)}
+        cells = [
+            f"{100.0 * found[key].value:.0f} ({found[key].count})" if found[key].count else "-"
+            for key in SHOWN
+        ]
+        table.add_row(name, str(len(rows)), *cells)
+    return table
+
+
+def _stated(done: Trial) -> RichTable:
+    from rich.table import Table
+
+    from rtcomp.trial.calibration import calibration
+
+    table = Table(title="Names by stated probability", title_justify="left")
+    for heading in ("stated", "mean", "right", "of"):
+        table.add_column(heading, justify="left" if heading == "stated" else "right", no_wrap=True)
+    for stated in calibration(done.rows):
+        mean = "-" if stated.mean is None else f"{stated.mean:.3f}"
+        table.add_row(stated.says, mean, _number(stated.figure), str(stated.count))
+    return table
 
 
 def _percent(value: float) -> str:

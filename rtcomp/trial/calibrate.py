@@ -30,6 +30,8 @@ class Grown:
     shows: Strength
     beyond_belief: bool = True
     """Whether the stage with it is further from the believed one than beliefs are wrong anyway."""
+    form: str = ""
+    """Which of its other forms it has; "" for the one that every trial drew before there were others."""
 
     @property
     def detectable(self) -> bool:
@@ -40,6 +42,7 @@ class Grown:
         """Return it as it is sealed."""
         return {
             "name": self.name,
+            "form": self.form,
             "changes": self.changes,
             "parameters": self.parameters,
             "share": self.shows.share,
@@ -53,7 +56,9 @@ class Grown:
     def from_json(cls, data: dict[str, Any]) -> Grown:
         """Read what `to_json` wrote."""
         shows = Strength(data["share"], data["beyond"], data["floor"])
-        return cls(data["name"], data["changes"], data["parameters"], shows, data["beyond_belief"])
+        return cls(
+            data["name"], data["changes"], data["parameters"], shows, data["beyond_belief"], data["form"]
+        )
 
 
 def grow(secret: Secret, sized: Sized, rig: Rig, reference: Floats, clean: Run, target: float) -> Grown:

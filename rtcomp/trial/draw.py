@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
+import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from rtcomp.trial.axis import Loop, Physics
 from rtcomp.trial.calibrate import Grown, grow
-from rtcomp.trial.hidden import EFFECTS, OUTSIDE, RETUNED, SECRETS, Rig, Secret
-from rtcomp.trial.motion import draw_reference
-from rtcomp.trial.plant import Loop, Physics, Run, simulate
-from rtcomp.trial.stagefile import Believed, stage_file
+from rtcomp.trial.families import FAMILIES, Family
+from rtcomp.trial.hidden import SECRETS, Rig, Secret
+from rtcomp.trial.hidden.forms import FORMS, Form, in_form
+from rtcomp.trial.plant import Run, simulate
+from rtcomp.trial.stagefile import stage_file
 
 SHARES = {"clean": 0.15, "one": 0.45, "two": 0.13, "outside": 0.15, "retuned": 0.12}
 """Kinds of cases, by what is hidden, and their part of a trial."""
@@ -21,6 +25,12 @@ WEAK = 0.3
 """Strength of the weak tier, relative to the full one."""
 STRENGTHS = (0.0167, 0.30)
 """Rms force of an effect over that of the motion, full tier: from, to."""
+SATURATED = 0.05
+"""Part of the rows with the command at its limit beyond which the stage is drawn again."""
+FOLLOWS = 0.5
+"""Standard deviation of the position error over that of the reference beyond which it is drawn again."""
+ATTEMPTS = 12
+"""Stages drawn at most for one case."""
 ALIKE = (
     {"drive-offset", "constant-force", "gravity"},
     {"drive-delay", "drive-lag", "sensor-delay"},
@@ -47,22 +57,55 @@ class Plan:
     secrets: tuple[str, ...]
     tier: str
     seed: int
+    family: str = "micrometre"
+    forms: float = 0.0
+    """Share of effects hidden in another form, of those that have one."""
 
 
-def plan(cases: int, seed: int, only: str | None = None) -> list[Plan]:
+def plan(
+    cases: int,
+    seed: int,
+    only: str | None = None,
+    families: Sequence[str] = ("micrometre",),
+    forms: float | None = None,
+) -> list[Plan]:
     """Return what each of `cases` hides: every kind where there are five or more, effects in turn.
 
-    With `only`, one of `SHARES`, all are of that kind: what is rare takes many to see.
+    With `only`, one of `SHARES`, all are of that kind: what is rare takes many to see. All `families` have
+    as many cases, to within one, and about as many of each kind. `forms` is the share of effects hidden in
+    another form, by default that of each family.
     """
-    chance = np.random.default_rng(seed)
     counts = {kind: int(share * cases) for kind, share in SHARES.items()}
     if cases >= len(counts):
         counts = {kind: max(1, count) for kind, count in counts.items()}
     counts["one"] += cases - sum(counts.values())
     if only is not None:
         counts = {only: cases}
-    effects, pairs = _in_turn(chance, EFFECTS), _in_turn(chance, EFFECTS)
-    outside, retuned = _in_turn(chance, OUTSIDE), _in_turn(chance, RETUNED)
+    # Dealt round: every family is given as many, and as many of each kind, to within one.
+    order = [kind for kind, count in counts.items() for _ in range(count)]
+    names = list(dict.fromkeys(families))
+    dealt = [order[i :: len(names)] for i in range(len(names))]
+    each = [
+        _of_family(FAMILIES[name], {kind: kinds.count(kind) for kind in counts}, _own_seed(seed, name), forms)
+        for name, kinds in zip(names, dealt, strict=True)
+    ]
+    mixed = [p for row in itertools.zip_longest(*each) for p in row if p is not None]
+    width = len(str(cases - 1))
+    return [replace(p, name=f"case{i:0{width}d}") for i, p in enumerate(mixed)]
+
+
+def _own_seed(seed: int, family: str) -> int | list[int]:
+    """Return the seed of a family's draws, whichever families are drawn beside it."""
+    # The micrometre stage is drawn as it was when there was no other.
+    return seed if family == "micrometre" else [seed, zlib.crc32(family.encode())]
+
+
+def _of_family(
+    family: Family, counts: Mapping[str, int], seed: int | list[int], forms: float | None
+) -> list[Plan]:
+    chance = np.random.default_rng(seed)
+    effects, pairs = _in_turn(chance, family.effects), _in_turn(chance, family.effects)
+    outside, retuned = _in_turn(chance, family.outside), _in_turn(chance, family.retuned)
     drawn: list[tuple[str, tuple[str, ...]]] = []
     for kind, count in counts.items():
         for _ in range(count):
@@ -77,10 +120,15 @@ def plan(cases: int, seed: int, only: str | None = None) -> list[Plan]:
     order = chance.permutation(len(drawn))
     seeds = chance.integers(0, 2**62, len(drawn))
     tiers = np.where(chance.random(len(drawn)) < 0.25, "weak", "full")
-    width = len(str(cases - 1))
+    share = family.forms if forms is None else forms
     return [
         Plan(
-            f"case{i:0{width}d}", *drawn[int(j)], str(tiers[i]) if drawn[int(j)][1] else "full", int(seeds[i])
+            "",
+            *drawn[int(j)],
+            str(tiers[i]) if drawn[int(j)][1] else "full",
+            int(seeds[i]),
+            family.name,
+            share,
         )
         for i, j in enumerate(order)
     ]
@@ -116,10 +164,15 @@ class Case:
     """Content of the stage file."""
     hidden: tuple[Grown, ...]
 
+    @property
+    def rotary(self) -> bool:
+        """Whether the axis turns."""
+        return FAMILIES[self.plan.family].rotary
+
     def reference(self, which: str) -> Any:
-        """Return the reference of the run ``train`` or ``unseen``."""
+        """Return the reference of the run ``train`` or ``unseen``; in open loop the command."""
         chance = np.random.default_rng([self.plan.seed, _WHICH[which]])
-        return draw_reference(chance, self.loop.rate, **self.motion)
+        return FAMILIES[self.plan.family].reference(chance, self.loop, self.motion)
 
     def run(self, which: str, *, bare: bool = False) -> Run:
         """Return the run ``train`` or ``unseen``, or its twin without what is hidden; always the same."""
@@ -130,6 +183,8 @@ class Case:
         """Return what is sealed: all that is hidden, and all that makes the case again."""
         return {
             "name": self.plan.name,
+            "family": self.plan.family,
+            "forms": self.plan.forms,
             "kind": self.plan.kind,
             "tier": self.plan.tier,
             "seed": self.plan.seed,
@@ -145,7 +200,10 @@ class Case:
     def again(cls, answer: dict[str, Any]) -> Case:
         """Make the case of an opened answer."""
         chosen = tuple(e["name"] for e in answer["effects"])
-        plan = Plan(answer["name"], answer["kind"], chosen, answer["tier"], answer["seed"])
+        plan = Plan(
+            answer["name"], answer["kind"], chosen, answer["tier"], answer["seed"], answer["family"],
+            answer["forms"],
+        )  # fmt: skip
         return cls(
             plan, Physics(**answer["physics"]), Physics(**answer["bare"]), Loop(**answer["loop"]),
             answer["motion"], answer["stage"], tuple(Grown.from_json(e) for e in answer["effects"]),
@@ -156,13 +214,27 @@ _WHICH = {"train": 1, "unseen": 2}
 
 
 def draw(plan: Plan) -> Case:
-    """Draw the case of a plan; the same plan gives the same case."""
-    chance = np.random.default_rng([plan.seed, 0])
-    loop, physics, motion = draw_stage(chance)
-    believed = Believed.of(physics, chance)
+    """Draw the case of a plan; the same plan gives the same case.
+
+    A stage that the controller loses, alone or with an effect at any strength, is drawn again.
+    """
+    failed: Exception | None = None
+    for attempt in range(ATTEMPTS):
+        chance = np.random.default_rng([plan.seed, 0, attempt] if attempt else [plan.seed, 0])
+        try:
+            return _drawn(plan, chance)
+        except (RuntimeError, FloatingPointError) as error:
+            failed = error
+    raise RuntimeError(f"{plan.family}: no stage in {ATTEMPTS} that stays controlled ({failed})") from failed
+
+
+def _drawn(plan: Plan, chance: np.random.Generator) -> Case:
+    family = FAMILIES[plan.family]
+    loop, physics, motion = family.stage(chance)
+    believed = family.belief(physics, chance)
     case = Case(plan, physics, physics, loop, motion, {}, ())
-    clean = case.run("train")
-    rig = look(physics, loop, motion, clean)
+    clean = _sound(case, "train")
+    rig = look(physics, loop, motion, clean, family.rotary)
     known: list[dict[str, Any]] = []
     secrets = [SECRETS[name] for name in plan.secrets]
     for secret in secrets:
@@ -172,69 +244,53 @@ def draw(plan: Plan) -> Case:
             known.append(entry)
     if known:
         case = Case(plan, physics, physics, loop, motion, {}, ())
-        clean = case.run("train")
-        rig = look(physics, loop, motion, clean)
+        clean = _sound(case, "train")
+        rig = look(physics, loop, motion, clean, family.rotary)
+    forms = np.random.default_rng([plan.seed, 3])
     hidden = []
     for secret in secrets:
         target = math.exp(chance.uniform(*np.log(STRENGTHS))) * (WEAK if plan.tier == "weak" else 1.0)
-        hidden.append(grow(secret, secret.draw(chance, rig), rig, case.reference("train"), clean, target))
+        form = _form(plan, secret, forms)
+        sized = secret.draw(chance, rig) if form is None else in_form(form, secret, chance, rig)
+        one = grow(secret, sized, rig, case.reference("train"), clean, target)
+        hidden.append(replace(one, form="" if form is None else form.name))
     full = physics
     for grown in hidden:
         full = full._replace(**grown.changes)
     hidden = [replace(g, beyond_belief=believed.off(full, PER_VOLT.get(g.name, ()))) for g in hidden]
-    stage = stage_file(believed, loop, known)
-    return Case(plan, full, physics, loop, motion, stage, tuple(hidden))
+    stage = stage_file(believed, loop, known, rotary=family.rotary)
+    whole = Case(plan, full, physics, loop, motion, stage, tuple(hidden))
+    for which in _WHICH:
+        _sound(whole, which)
+    return whole
 
 
-def draw_stage(chance: np.random.Generator) -> tuple[Loop, Physics, dict[str, float]]:
-    """Draw a stage, its loop and how it is to move: what a laboratory might have on its table."""
-    kind = chance.choice(["interferometer", "encoder", "worse"], p=[0.5, 0.4, 0.1])
-    rate = float(chance.choice([500.0, 1000.0, 2000.0, 4000.0], p=[0.15, 0.55, 0.2, 0.1]))
-    if kind == "interferometer":
-        noise, resolution = _log(chance, 8e-9, 2.5e-8), float(chance.choice([1e-9, 5e-9, 1e-8]))
-    elif kind == "encoder":
-        noise, resolution = _log(chance, 1e-8, 4e-8), 1e-7
-    else:
-        resolution = _log(chance, 2e-7, 8e-7)
-        noise, rate = 0.3 * resolution, min(rate, 1000.0)
-    while True:
-        mass, level = _log(chance, 0.5, 5.0), _log(chance, 1.0, 10.0)
-        # How fast friction alone could stop the mass within the stroke sets the pace of everything.
-        pace = _log(chance, 25.0, min(80.0, rate / 16.0 + 1.0))
-        stroke = level / (mass * pace**2)
-        reach = stroke / _log(chance, 8.0, 40.0)
-        if max(2e-6, 60.0 * max(noise, resolution)) <= reach <= 1e-4:
-            break
-    shape = chance.uniform(2.5, 5.0)
-    # Inertia asks for half to twice the friction at the fastest.
-    fastest = pace * math.sqrt(chance.uniform(0.5, 2.0)) / (2.0 * math.pi)
-    seconds = min(chance.uniform(20.0, 60.0), 120_000.0 / rate)
-    motion = {"seconds": seconds, "stroke": stroke, "reach": reach, "fastest": fastest}
-    speed = 0.3 * stroke * 2.0 * math.pi * 0.5 * fastest
-    force_constant = level / chance.uniform(0.4, 1.5)
-    stiffness = level * shape / reach
-    micro = 2.0 * chance.uniform(0.05, 0.2) * math.sqrt(stiffness * mass)
-    # The damping of presliding fades before it would be a friction of its own.
-    micro_speed = min(speed * chance.uniform(0.2, 0.6), 0.3 * level / micro)
-    physics = Physics(
-        mass, force_constant, 10.0, level * chance.uniform(0.03, 0.2) / speed, micro, micro_speed,
-        level, reach, shape,
-    )  # fmt: skip
-    omega = min(pace * math.sqrt(chance.uniform(6.0, 15.0)), rate / 5.0)
-    kp = mass * omega**2 / force_constant
-    kd = 2.0 * chance.uniform(0.4, 0.7) * mass * omega / force_constant
-    return Loop(kp, kp * chance.uniform(5.0, 12.0), kd, rate, noise, resolution), physics, motion
+def _form(plan: Plan, secret: Secret, chance: np.random.Generator) -> Form | None:
+    """Choose another form of an effect, None for the one that it has anyway."""
+    forms = FORMS.get(secret.name)
+    if not forms or chance.random() >= plan.forms:
+        return None
+    return forms[int(chance.integers(len(forms)))]
 
 
-def look(physics: Physics, loop: Loop, motion: dict[str, float], run: Run) -> Rig:
+def _sound(case: Case, which: str) -> Run:
+    """Return a run; raise FloatingPointError where the controller loses the axis or cannot follow."""
+    run = case.run(which)
+    if case.plan.family == "micrometre":  # drawn as it was before this was asked
+        return run
+    at_limit = np.mean(np.abs(run.voltage) >= 0.999 * case.physics.voltage_limit)
+    if at_limit > SATURATED:
+        raise FloatingPointError(f"{100.0 * at_limit:.0f} % of the command is at its limit")
+    if not case.loop.open and not np.std(run.reference - run.truth) < FOLLOWS * np.std(run.reference):
+        raise FloatingPointError("the axis does not follow its reference")
+    return run
+
+
+def look(physics: Physics, loop: Loop, motion: dict[str, float], run: Run, rotary: bool = False) -> Rig:
     """Return the stage with the figures of its motion without anything hidden."""
     velocity = np.gradient(run.truth) * loop.rate
     return Rig(
         physics, loop, float(np.max(np.abs(run.truth))), float(np.sqrt(np.mean(velocity**2))),
         physics.force_constant * float(np.sqrt(np.mean(run.voltage**2))),
-        float(np.quantile(np.abs(run.voltage), 0.99)), motion["seconds"],
+        float(np.quantile(np.abs(run.voltage), 0.99)), motion["seconds"], rotary,
     )  # fmt: skip
-
-
-def _log(chance: np.random.Generator, low: float, high: float) -> float:
-    return math.exp(chance.uniform(math.log(low), math.log(high)))

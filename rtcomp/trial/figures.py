@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rtcomp.trial.hidden.forms import is_foreign
 from rtcomp.trial.score import WORSE, Scored, right_period
 
 
@@ -62,6 +63,8 @@ def figures(rows: Sequence[Scored], *, gains: bool = True) -> list[Figure]:
     outside = [r for r in rows if r.case.plan.kind == "outside" and r.detectable]
     singles = [r.matches[0] for r in one]
     held = [m for m in singles if m.held]
+    forms = [(r.matches[0], r.case.hidden[0]) for r in one if r.case.hidden[0].form]
+    foreign = [m for m, grown in forms if is_foreign(grown.name, grown.form)]
     found = [
         _part("right, all cases", rows, lambda r: r.right),
         _part("named first, one effect", singles, lambda m: m.first, (0.95, 1.0)),
@@ -75,6 +78,9 @@ def figures(rows: Sequence[Scored], *, gains: bool = True) -> list[Figure]:
         _part("outside called unexplained", outside, lambda r: r.matches[0].found, (0.85, 1.0)),
         _part("outside misnamed", outside, lambda r: bool(r.wrong), (0.0, 0.05)),
     ]
+    if forms:
+        found.append(_part("named first, in another form", forms, lambda f: f[0].first))
+        found.append(_part("... that the catalogue has not", foreign, lambda m: m.first))
     if gains:
         found += _of_stages(rows)
     found.append(_quantile("seconds, median", [r.outcome.seconds for r in rows], 0.5, (0.0, 60.0), "s"))

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtcomp.kernels import Floats
+from rtcomp.trial.axis import Loop, Physics
 from rtcomp.trial.friction import ELEMENTS, along, stop_elements, stops_along
-from rtcomp.trial.plant import Loop, Physics, Run
+from rtcomp.trial.plant import Run
 
 SETTLE_S = 0.3
 """Left out at both ends of a run: filters and memory settle."""
@@ -72,7 +73,7 @@ def balance(physics: Physics, loop: Loop, run: Run, position: Floats) -> Balance
     """Return the balance of `physics` (without effects) on `position` (m, (K,)) and the run's voltage."""
     from scipy.signal import butter, sosfiltfilt
 
-    cut = min(100.0, 0.1 * loop.rate)
+    cut = loop.cut or min(max(100.0, 0.025 * loop.rate), 0.1 * loop.rate)
     sections = butter(3, cut, fs=loop.rate, output="sos")
 
     def smooth(signal: Floats) -> Floats:
@@ -91,8 +92,9 @@ def balance(physics: Physics, loop: Loop, run: Run, position: Floats) -> Balance
     micro = np.exp(-((velocity / physics.micro_speed) ** 2)) * velocity
     drive = smooth(physics.force_constant * held)
     rest = physics.level * g * memory + physics.viscous * velocity + physics.micro_damping * micro
-    needed = smooth(physics.mass * acceleration + rest)
-    columns = [acceleration, velocity, micro, g * memory, g * (further - memory)]
+    known, springs = _springs(physics, slow)
+    needed = smooth(physics.mass * acceleration + rest + known)
+    columns = [acceleration, velocity, micro, g * memory, *springs, g * (further - memory)]
     edge = int(SETTLE_S * loop.rate)
     inside = slice(edge, slow.size - edge)
     tangents = np.column_stack([smooth(c)[inside] for c in columns])
@@ -100,6 +102,18 @@ def balance(physics: Physics, loop: Loop, run: Run, position: Floats) -> Balance
     stops = stops_along(warped, elements[:, 0].copy(), elements[:, 1].copy())
     held_by = np.column_stack([smooth(g * stop)[inside] for stop in stops.T])
     return Balance((drive - needed)[inside], needed[inside], tangents, held_by, physics.level)
+
+
+def _springs(physics: Physics, position: Floats) -> tuple[Floats, list[Floats]]:
+    """Return the force (N, (K,)) of a known spring and pendulum, and what retuning can make of it."""
+    force, tangents = np.zeros(position.size), []
+    if physics.spring != 0.0:
+        force += physics.spring * position
+        tangents.append(position)
+    if physics.pendulum != 0.0:
+        force -= physics.pendulum * np.sin(position + physics.pendulum_phase)
+        tangents += [np.sin(position), np.cos(position)]
+    return force, tangents
 
 
 @dataclass(frozen=True)

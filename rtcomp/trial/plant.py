@@ -10,106 +10,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from rtcomp.kernels import Floats, compiled
-from rtcomp.trial.friction import AT, DEPTH, FROM, XI, advance
+from rtcomp.trial.axis import FAR, Loop, Physics
+from rtcomp.trial.forces import bell, film, gain, push, reading, scale, slip_level, softened, volts
+from rtcomp.trial.friction import AT, DEPTH, ELEMENTS, FROM, XI, advance, stop_elements
 
-FAR = 1e9
-"""A limit that is never met."""
-
-
-class Physics(NamedTuple):
-    """Every parameter of the plant, SI; the defaults leave an effect out."""
-
-    mass: float
-    force_constant: float
-    voltage_limit: float
-    viscous: float
-    micro_damping: float
-    micro_speed: float
-    level: float
-    reach: float
-    shape: float
-    skew: float = 0.0
-    offset: float = 0.0
-    deadband: float = 0.0
-    saturation: float = FAR
-    delay: float = 0.0
-    lag: float = 0.0
-    back_emf: float = 0.0
-    ripple: float = 0.0
-    ripple_period: float = 1.0
-    ripple_phase: float = 0.0
-    cogging: float = 0.0
-    cogging_period: float = 1.0
-    cogging_phase: float = 0.0
-    cogging_second: float = 0.0
-    spring: float = 0.0
-    spring_cubic: float = 0.0
-    weight: float = 0.0
-    stop_position: float = FAR
-    stop_stiffness: float = 0.0
-    gap: float = 0.0
-    second_mass: float = 0.0
-    second_stiffness: float = 0.0
-    second_damping: float = 0.0
-    quadratic: float = 0.0
-    backward_viscous: float = 1.0
-    stribeck: float = 0.0
-    stribeck_speed: float = 1.0
-    place: float = 0.0
-    place_period: float = 1.0
-    place_phase: float = 0.0
-    place_slope: float = 0.0
-    load_friction: float = 0.0
-    softening: float = 0.0
-    friction_lag: float = 0.0
-    ageing: float = 0.0
-    ageing_distance: float = 1.0
-    drift: float = 0.0
-    drift_time: float = 1.0
-    creep: float = 0.0
-    creep_time: float = 1.0
-    scale: float = 1.0
-    sensor_delay: float = 0.0
-    cyclic: float = 0.0
-    cyclic_period: float = 1.0
-    sensor_drift: float = 0.0
-    sensor_drift_time: float = 1.0
-    jump: float = 0.0
-    jump_time: float = FAR
-    tone: float = 0.0
-    tone_frequency: float = 1.0
-    tone_phase: float = 0.0
-    bias: float = 0.0
-    bump: float = 0.0
-    bump_place: float = 0.0
-    bump_width: float = 1.0
-    speed_bump: float = 0.0
-    speed_bump_at: float = 1.0
-    speed_bump_width: float = 1.0
-    place_damping: float = 0.0
-    place_damping_at: float = 0.0
-    place_damping_width: float = 1.0
-    walk: float = 0.0
-    gain_memory: float = 0.0
-    gain_memory_width: float = 1.0
-    hump: float = 0.0
-    hump_distance: float = 1.0
-
-
-class Loop(NamedTuple):
-    """Controller and sensor: V/m, V/(m s), V s/m; Hz; m rms, m."""
-
-    kp: float
-    ki: float
-    kd: float
-    rate: float
-    noise: float
-    resolution: float
+__all__ = ["FAR", "Loop", "Physics", "Run", "coloured", "simulate", "substeps"]
 
 
 @dataclass(frozen=True)
@@ -124,13 +33,18 @@ class Run:
 
 
 def simulate(physics: Physics, loop: Loop, reference: Floats, seed: int) -> Run:
-    """Run the plant in closed loop along `reference` (m, (K,)); same seed, same run."""
+    """Run the plant in closed loop along `reference` (m, (K,)); same seed, same run.
+
+    Where the loop is open, `reference` is the command (V).
+    """
     chance = np.random.default_rng(seed)
     noise = loop.noise * coloured(chance, reference.size)
     walk = _wander(chance, reference.size, loop.rate)
     parts = substeps(physics, loop.rate)
     out = np.empty((3, reference.size))
-    _run(physics, loop, np.ascontiguousarray(reference, dtype=np.float64), noise, walk, parts, out)
+    elements = np.array(stop_elements(physics.level, physics.reach, physics.shape, ELEMENTS))
+    asked = np.ascontiguousarray(reference, dtype=np.float64)
+    _run(physics, loop, asked, noise, walk, elements, parts, out)
     if not np.all(np.isfinite(out)):
         raise FloatingPointError("the trial's plant ran away")
     time = np.arange(reference.size) / loop.rate
@@ -167,92 +81,16 @@ def _wander(chance: np.random.Generator, count: int, rate: float) -> Floats:
 
 
 @compiled
-def _bell(x: float, width: float) -> float:
-    ratio = x / width
-    return math.exp(-ratio * ratio)
-
-
-@compiled
-def _reading(p: Physics, t: float, x: float) -> float:
-    """Return what the sensor says of `x` at `t`, without noise."""
-    y = x / p.scale + p.cyclic * math.sin(2.0 * math.pi * x / p.cyclic_period)
-    y += p.sensor_drift * (1.0 - math.exp(-t / p.sensor_drift_time))
-    return y + (p.jump if t >= p.jump_time else 0.0)
-
-
-@compiled
-def _push(p: Physics, t: float, x: float) -> float:
-    """Return the forces that friction and drive have no part in."""
-    force = p.bias + p.weight - (p.spring + p.spring_cubic * x * x) * x
-    depth = x - p.stop_position
-    if (p.stop_position >= 0.0 and depth > 0.0) or (p.stop_position < 0.0 and depth < 0.0):
-        force -= p.stop_stiffness * depth
-    if p.tone != 0.0:
-        force += p.tone * math.sin(2.0 * math.pi * p.tone_frequency * t + p.tone_phase)
-    if p.cogging != 0.0:
-        angle = 2.0 * math.pi * x / p.cogging_period + p.cogging_phase
-        force += p.cogging * (math.sin(angle) + p.cogging_second * math.sin(2.0 * angle))
-    if p.bump != 0.0:
-        force += p.bump * _bell(x - p.bump_place, p.bump_width)
-    return force
-
-
-@compiled
-def _gain(p: Physics, x: float, walk: float) -> float:
-    """Return the force per volt here and now."""
-    gain = p.force_constant * (1.0 + p.walk * walk)
-    if p.ripple != 0.0:
-        gain *= 1.0 + p.ripple * math.sin(2.0 * math.pi * x / p.ripple_period + p.ripple_phase)
-    return gain
-
-
-@compiled
-def _volts(p: Physics, command: float) -> float:
-    """Return what arrives of a command after offset, dead band and saturation."""
-    u = command + p.offset
-    if abs(u) <= p.deadband:
-        return 0.0
-    u -= math.copysign(p.deadband, u)
-    return max(-p.saturation, min(p.saturation, u))
-
-
-@compiled
-def _slip_level(p: Physics, speed: float, rest: float) -> float:
-    """Return the factor on the yield level: Stribeck's fall with speed, growth with the time of contact."""
-    g = 1.0
-    if p.stribeck != 0.0:
-        g += p.stribeck * _bell(speed, p.stribeck_speed)
-    if p.ageing != 0.0:
-        g += p.ageing * math.log10(1.0 + rest / 0.01)
-    return g
-
-
-@compiled
-def _scale(p: Physics, t: float, x: float, load: float) -> float:
-    """Return the factor on the friction force: place, drift, load."""
-    factor = 1.0 + p.place_slope * x + p.drift * (1.0 - math.exp(-t / p.drift_time))
-    if p.place != 0.0:
-        factor += p.place * math.sin(2.0 * math.pi * x / p.place_period + p.place_phase)
-    return max(factor, 0.0) + p.load_friction * load / p.level
-
-
-@compiled
-def _film(p: Physics, x: float, v: float) -> float:
-    """Return force per speed of everything that grows with speed, as a lubricant's film does."""
-    c = p.viscous * (p.backward_viscous if v < 0.0 else 1.0)
-    if p.place_damping != 0.0:
-        c += p.place_damping * _bell(x - p.place_damping_at, p.place_damping_width)
-    return c + p.quadratic * abs(v)
-
-
-@compiled
 def _run(
-    p: Physics, loop: Loop, reference: Floats, noise: Floats, walk: Floats, parts: int, out: Floats
-) -> None:
+    p: Physics, loop: Loop, reference: Floats, noise: Floats, walk: Floats, elements: Floats, parts: int,
+    out: Floats,
+) -> None:  # fmt: skip
     """Write reading, command and noiseless reading, a row a tick, into `out` (3, K)."""
     tick = 1.0 / loop.rate
     step = tick / parts
     z = np.zeros(AT + 2 * DEPTH)
+    bent = np.zeros(elements.shape[0])
+    softer = 0.0
     commands = np.zeros(reference.size + 1)
     ago = p.sensor_delay / step
     past = np.zeros(int(ago) + 2)
@@ -265,7 +103,7 @@ def _run(
         t = k * tick
         older = ago - int(ago)
         seen = (1.0 - older) * past[(n + 2) % past.size] + older * past[(n + 1) % past.size]
-        out[2, k] = _reading(p, t, seen)
+        out[2, k] = reading(p, t, seen)
         measured = out[2, k] + noise[k]
         if loop.resolution > 0.0:
             measured = math.floor(measured / loop.resolution + 0.5) * loop.resolution
@@ -273,6 +111,8 @@ def _run(
         u = loop.kp * error + loop.ki * (integral + error * tick)
         u += loop.kd * (error - before) * loop.rate if k > 0 else 0.0
         before = error
+        if loop.open != 0.0:
+            u = reference[k]
         if abs(u) < p.voltage_limit:
             integral += error * tick
         commands[k] = max(-p.voltage_limit, min(p.voltage_limit, u))
@@ -284,11 +124,11 @@ def _run(
             part = arrived - first  # a command may arrive within a sub-step
             u = part * commands[(first + 1) // parts] if first >= -1 else 0.0
             u += (1.0 - part) * commands[first // parts] if first >= 0 else 0.0
-            u = _volts(p, u)
+            u = volts(p, u)
             if p.lag > 0.0:
                 lagged_volts += (u - lagged_volts) * (1.0 - math.exp(-step / p.lag))
                 u = lagged_volts
-            drive = _gain(p, x, walk[k]) * u
+            drive = gain(p, x, walk[k]) * u
             if p.gain_memory != 0.0:
                 play = max(u - p.gain_memory_width, min(u + p.gain_memory_width, play))
                 drive += p.gain_memory * p.force_constant * (play - u)
@@ -297,19 +137,19 @@ def _run(
             xf, vf = (x2, v2) if p.gap > 0.0 else (x, v)
             lagged_speed += (vf - lagged_speed) * (step / (p.friction_lag + step))
             speed = lagged_speed if p.friction_lag > 0.0 else vf
-            level = p.level * _scale(p, t, xf, abs(drive))
-            g = _slip_level(p, speed, rest)
-            film = _film(p, xf, speed)
+            level = p.level * scale(p, t, xf, abs(drive))
+            g = slip_level(p, t, speed, rest)
+            damped = film(p, xf, speed)
             # A film follows speed late; the contacts' own damping in presliding does not.
-            force = level * g * h + film * (speed - vf)
+            force = level * g * (h + softer) + damped * (speed - vf)
             if p.speed_bump != 0.0:
-                bell = _bell(abs(vf) - p.speed_bump_at, p.speed_bump_width)
-                force += p.speed_bump * math.copysign(bell, vf)
+                around = bell(abs(vf) - p.speed_bump_at, p.speed_bump_width)
+                force += p.speed_bump * math.copysign(around, vf)
             if p.hump != 0.0:
                 ratio = abs(z[XI] - z[FROM]) / p.hump_distance
                 force += p.hump * h * ratio * math.exp(1.0 - ratio)
-            force = _push(p, t, xf) - force
-            damping = film + p.micro_damping * _bell(vf, p.micro_speed)
+            force = push(p, t, xf) - force
+            damping = damped + p.micro_damping * bell(vf, p.micro_speed)
             between = 0.0
             if two:
                 apart = x - x2
@@ -337,9 +177,11 @@ def _run(
                 slid = step * (yielded - crept) / (p.creep_time + step)
                 crept += slid
                 moved -= slid
-            h = advance(
-                z, moved / g, p.reach, p.shape * (1.0 + p.skew), p.shape * (1.0 - p.skew), p.softening
-            )
+            reversing = p.softening if p.softening_form == 0.0 else 0.0
+            up, down = p.shape * (1.0 + p.skew), p.shape * (1.0 - p.skew)
+            h = advance(z, moved / g, p.reach, up, down, reversing)
+            if p.softening_form != 0.0:
+                softer = softened(p, h, moved / g, elements, bent)
             if p.ageing != 0.0:
                 rest = (rest + step) / (1.0 + abs(moved) / p.ageing_distance)
             n += 1

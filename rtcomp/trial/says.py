@@ -27,11 +27,14 @@ ALIASES: dict[str, frozenset[str]] = {
 FRICTION = frozenset({"friction", "friction_level", "friction-level", "friction_reach", "friction_shape"})
 RETUNED: dict[str, frozenset[str]] = {
     # A recording sees only what moves per volt: whichever of the numbers leaves what beliefs allow.
-    "drive-gain": frozenset({"force_constant", "mass", "viscous"}) | FRICTION,
+    "drive-gain": frozenset({"force_constant", "mass", "viscous", "parallel-spring", "gravity"}) | FRICTION,
     "inertia": frozenset({"mass"}),
     "viscous-friction": frozenset({"viscous"}),
     "back-emf": frozenset({"viscous"}),
     "stribeck": frozenset({"stribeck"}),
+    # Another law of a spring that is believed, another load on a joint.
+    "parallel-spring": frozenset({"parallel-spring"}),
+    "gravity": frozenset({"gravity"}),
 }
 """Parameters of the stage whose retuning says the same as the effect's name."""
 SLOTS = {"mass": "mass", "viscous": "viscous", "force_constant": "force_constant", "friction.level": "level"}
@@ -41,8 +44,10 @@ NEAR = 0.05
 UNEXPLAINED = "unexplained"
 
 
-def alike(truth: str) -> frozenset[str]:
-    """Return the names that say what `truth` is."""
+def alike(truth: str, rotary: bool = False) -> frozenset[str]:
+    """Return the names that say what `truth` is; on a rotary axis weight changes with the angle."""
+    if rotary and truth in STEADY:
+        return frozenset({truth}) if truth == "gravity" else STEADY - {"gravity"}
     return ALIASES.get(truth, frozenset({UNEXPLAINED if truth.startswith("outside-") else truth}))
 
 
@@ -60,6 +65,8 @@ class Said:
     """Value, low and high of the parameters of each effect's likeliest name, by that name."""
     retuned: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     """Value, low and high of each retuned parameter."""
+    probabilities: tuple[float | None, ...] = ()
+    """Stated for each set of `named`; None where none is."""
 
     @classmethod
     def read(cls, path: Path) -> Said:
@@ -67,22 +74,34 @@ class Said:
         try:
             data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
             effects = [(tuple(map(str, e["names"])), e.get("parameters", {})) for e in data["effects"]]
+            stated = [e.get("probability") for e in data["effects"]]
+            named = [
+                (n, None if p is None else float(p))
+                for (names, _), p in zip(effects, stated, strict=True)
+                if (n := tuple(x for x in names if x != UNEXPLAINED))
+            ]
             retuned = {str(r["parameter"]): r for r in data["retuned"]}
             moved = {
                 name.split("[")[0].split(".")[0]
                 for name, r in retuned.items()
-                if r["from"] and abs(r["to"] / r["from"] - 1.0) > MOVED
+                if (abs(r["to"] / r["from"] - 1.0) > MOVED if r["from"] else _away(name, r))
             }
             return cls(
                 str(data["verdict"]),
-                tuple(n for names, _ in effects if (n := tuple(x for x in names if x != UNEXPLAINED))),
+                tuple(n for n, _ in named),
                 data["verdict"] == UNEXPLAINED or any(UNEXPLAINED in names for names, _ in effects),
                 tuple(sorted(moved)),
                 {names[0]: _intervals(p) for names, p in effects if names and names[0] != UNEXPLAINED},
                 {name: (float(r["to"]), float(r["low"]), float(r["high"])) for name, r in retuned.items()},
+                tuple(p for _, p in named),
             )
         except (KeyError, TypeError, AttributeError, IndexError, OSError) as error:
             raise ValueError(f"{path.name} is not a diagnosis: {type(error).__name__} {error}") from error
+
+
+def _away(name: str, retuned: dict[str, Any]) -> bool:
+    """Say whether a number of a believed effect that was zero is not any more."""
+    return name.count(".") == 1 and "-" in name and bool(retuned["low"] > 0.0 or retuned["high"] < 0.0)
 
 
 def _intervals(parameters: dict[str, Any]) -> dict[str, tuple[float, float, float]]:
@@ -107,12 +126,14 @@ class Match:
     """The likeliest name of that set, "" where there is none."""
 
 
-def match(said: Said, hidden: tuple[Grown, ...]) -> tuple[list[Match], list[tuple[str, ...]]]:
+def match(
+    said: Said, hidden: tuple[Grown, ...], rotary: bool = False
+) -> tuple[list[Match], list[tuple[str, ...]]]:
     """Return how each effect fared, and the sets of names that belong to none."""
     left = list(said.named)
     matches = []
     for effect in hidden:
-        names = alike(effect.name) - {UNEXPLAINED}
+        names = alike(effect.name, rotary) - {UNEXPLAINED}
         fitting = next((n for n in left if set(n) & names and set(n) <= names), None)
         holding = fitting or next((n for n in left if set(n) & names), None)
         if holding is not None:

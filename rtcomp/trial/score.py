@@ -120,6 +120,8 @@ class Scored:
             "gain_over_oracle": "" if self.gain_over_oracle is None else self.gain_over_oracle,
             "seconds": round(self.outcome.seconds, 2),
             "fault": self.fault,
+            "family": self.case.plan.family,
+            "form": "+".join(g.form for g in hidden),
         }
 
 
@@ -128,7 +130,7 @@ def score(case: Case, outcome: Outcome, said: Said | None, fault: str, errors: E
     if said is None:
         missed = tuple(Match(False, False, False, 0, 0, "") for _ in case.hidden)
         return Scored(case, outcome, None, fault, missed, (), errors)
-    matches, wrong = match(said, case.hidden)
+    matches, wrong = match(said, case.hidden, case.rotary)
     if len(matches) == 1 and said.named and matches[0].name and matches[0].name != said.named[0][0]:
         matches = [replace(matches[0], first=False)]
     return Scored(
@@ -141,7 +143,8 @@ def estimates(case: Case, said: Said) -> list[Estimate]:
     found = []
     for grown in case.hidden:
         values = said.intervals.get(grown.name, {})
-        for parameter in SECRETS[grown.name].scored:
+        secret = SECRETS[grown.name]
+        for parameter in (secret.period,) if grown.form else secret.scored:
             truth = grown.parameters.get(parameter, 0.0)
             if parameter in values and truth:
                 found.append(Estimate(grown.name, parameter, truth, *values[parameter]))

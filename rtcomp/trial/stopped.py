@@ -27,6 +27,11 @@ class Stopped:
     seconds: float = 0.0
     only: str | None = None
     """The kind that all cases are of; None for all kinds."""
+    families: list[str] = field(default_factory=lambda: ["micrometre"])
+    forms: float | None = None
+    method: str = "first"
+    not_drawn: dict[str, str] = field(default_factory=dict)
+    """Why cases could not be drawn, by case."""
     salts: dict[str, str] = field(default_factory=dict)
     """Hexadecimal, by case; empty where the trial was stopped before it had sealed."""
     ended: dict[str, dict[str, Outcome]] = field(default_factory=dict)
@@ -47,7 +52,9 @@ class Stopped:
             }
             found = cls(**{**content, "ended": ended})
             commitments = json.loads((folder / "commitments.json").read_text(encoding="utf-8"))["commitments"]
-            if commitments.keys() != found.salts.keys() or len(found.salts) != found.cases:
+            if commitments.keys() != found.salts.keys() or (
+                len(found.salts) + len(found.not_drawn) != found.cases
+            ):
                 raise ValueError("other cases were sealed")
             return found
         except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:

@@ -12,21 +12,23 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rtcomp import __version__
-from rtcomp.trial.draw import Case, draw, plan
+from rtcomp.errors import RtcompError
+from rtcomp.trial.calibration import calibration
+from rtcomp.trial.draw import Case, Plan, draw, plan
 from rtcomp.trial.figures import Figure, Seen, figures, seen
 from rtcomp.trial.rival import RIVALS, missing
 from rtcomp.trial.run import Outcome, Processes, Task
 from rtcomp.trial.says import Said
 from rtcomp.trial.score import Errors, Scored, score
 from rtcomp.trial.seal import Sealed
-from rtcomp.trial.stagefile import exact_stage, write_recording
+from rtcomp.trial.stagefile import exact_stage, write_case, write_recording
 from rtcomp.trial.stopped import Stopped
 from rtcomp.yamlfile import dump_yaml
 
@@ -50,6 +52,11 @@ class Settings:
     rivals: tuple[str, ...] = tuple(RIVALS)
     only: str | None = None
     """The kind that all cases are of; None for all kinds."""
+    families: tuple[str, ...] = ("micrometre",)
+    forms: float | None = None
+    """Share of effects hidden in another form, of those that have one; None for that of each family."""
+    method: str = "first"
+    """Of diagnosis; `diagnose` holds what chooses it."""
 
 
 Progress = Callable[[str, int, int], None]
@@ -66,6 +73,14 @@ class Trial:
     rivals: dict[str, list[Figure]]
     notes: list[str]
     seconds: float
+    not_drawn: dict[str, str] = field(default_factory=dict)
+    """Why cases could not be drawn, by case."""
+
+    @property
+    def families(self) -> dict[str, list[Scored]]:
+        """The rows of each family."""
+        names = dict.fromkeys(row.case.plan.family for row in self.rows)
+        return {name: [r for r in self.rows if r.case.plan.family == name] for name in names}
 
     def to_json(self, settings: Settings) -> dict[str, Any]:
         """Return the content of ``trial.json``."""
@@ -74,6 +89,8 @@ class Trial:
             "cases": settings.cases,
             "seed": settings.seed,
             "only": settings.only,
+            "method": settings.method,
+            "forms": settings.forms,
             "seconds": self.seconds,
             "figures": [f.to_json() for f in self.figures],
             "smallest_seen": [
@@ -81,6 +98,16 @@ class Trial:
                 for s in self.seen
             ],
             "rivals": {name: [f.to_json() for f in found] for name, found in self.rivals.items()},
+            "families": {
+                name: {
+                    "cases": len(rows),
+                    "figures": [f.to_json() for f in figures(rows)],
+                    "calibration": [s.to_json() for s in calibration(rows)],
+                }
+                for name, rows in self.families.items()
+            },
+            "calibration": [s.to_json() for s in calibration(self.rows)],
+            "not_drawn": self.not_drawn,
             "notes": self.notes,
             "estimates": [
                 {"case": row.case.plan.name, **asdict(e)} for row in self.rows for e in row.estimates
@@ -99,7 +126,7 @@ def trial(
     `earlier`, goes on from: what was diagnosed is not diagnosed again.
     """
     started = time.perf_counter()
-    so_far = Stopped.read(earlier) if earlier else Stopped(settings.cases, settings.seed, only=settings.only)
+    so_far = Stopped.read(earlier) if earlier else _nothing_yet(settings)
     before = so_far.seconds
     try:
         sealed = _sealed(settings, out, progress, so_far, earlier)
@@ -120,22 +147,34 @@ def trial(
     return done
 
 
+def _nothing_yet(settings: Settings) -> Stopped:
+    return Stopped(
+        settings.cases, settings.seed, only=settings.only, families=list(settings.families),
+        forms=settings.forms, method=settings.method,
+    )  # fmt: skip
+
+
 def _sealed(
     settings: Settings, out: Path, progress: Progress, so_far: Stopped, earlier: Path | None
 ) -> Sealed:
     """Draw all cases, write what the diagnoses get, and commit to the answers (or check them, if gone on)."""
     if earlier is not None:  # first of all: who stops it again finds here what was found there
         so_far.bring(earlier, out)
-    plans = plan(settings.cases, settings.seed, settings.only)
-    answers = {}
+    plans = plan(settings.cases, settings.seed, settings.only, settings.families, settings.forms)
+    answers, so_far.not_drawn = {}, {}
     # Threads: a signal that comes while a process is forked is lost there, or leaves a pool that never ends.
     pool = ThreadPoolExecutor(settings.jobs)
     try:
-        for case in pool.map(_make, plans, [out] * len(plans)):
-            answers[case.plan.name] = case.answer()
-            progress("draw", len(answers), len(plans))
+        for chosen, made in zip(plans, pool.map(_make, plans, [out] * len(plans)), strict=True):
+            if isinstance(made, Case):
+                answers[chosen.name] = made.answer()
+            else:
+                so_far.not_drawn[chosen.name] = made
+            progress("draw", len(answers) + len(so_far.not_drawn), len(plans))
     finally:
         pool.shutdown(cancel_futures=True)  # who stops it waits for the cases at hand, not for all
+    if not answers:
+        raise RtcompError(f"no case could be drawn; the first: {next(iter(so_far.not_drawn.values()))}")
     sealed = Sealed(answers, so_far.salts)
     if earlier is not None:
         sealed.check(out / "commitments.json")
@@ -176,7 +215,8 @@ def _through(
     rows = _scored(cases, ended[DIAGNOSES], out / DIAGNOSES, errors)
     rivals = {r: figures(_scored(cases, ended[r], out / r, {}), gains=False) for r in chosen}
     notes += [f"{r.case.plan.name}: {r.fault}" for r in rows if r.fault]
-    return Trial(rows, figures(rows), seen(rows), rivals, notes, 0.0)
+    notes += [f"{name}: not drawn: {why}" for name, why in so_far.not_drawn.items()]
+    return Trial(rows, figures(rows), seen(rows), rivals, notes, 0.0, so_far.not_drawn)
 
 
 def _scored(
@@ -189,13 +229,15 @@ def _scored(
     return rows
 
 
-def _make(chosen: Any, out: Path) -> Case:
-    """Draw a case and write what the diagnosis gets."""
-    case = draw(chosen)
-    folder = out / "cases" / case.plan.name
-    folder.mkdir(parents=True)
-    dump_yaml(folder / "stage.yaml", case.believed)
-    write_recording(folder / "train.csv.gz", case.run("train"), case.loop.resolution)
+def _make(chosen: Plan, out: Path) -> Case | str:
+    """Draw a case and write what the diagnosis gets; return why where that fails, which costs this case."""
+    folder = out / "cases" / chosen.name
+    try:
+        case = draw(chosen)
+        write_case(folder, case.believed, case.run("train"), case.loop)
+    except Exception as error:
+        shutil.rmtree(folder, ignore_errors=True)
+        return f"{type(error).__name__}: {error}"
     return case
 
 
@@ -248,8 +290,8 @@ def _judge(
     for n, case in enumerate(judged):
         name = case.plan.name
         folder, into = out / "cases" / name, out / DIAGNOSES / name
-        write_recording(folder / "unseen.csv.gz", case.run("unseen"), case.loop.resolution)
-        write_recording(folder / "bare.csv.gz", case.run("unseen", bare=True), case.loop.resolution)
+        write_recording(folder / "unseen.csv.gz", case.run("unseen"), case.loop)
+        write_recording(folder / "bare.csv.gz", case.run("unseen", bare=True), case.loop)
         dump_yaml(folder / "exact.yaml", exact_stage(case.bare, case.loop, case.believed))
         for which, recording, stage in (
             ("before", "unseen", folder / "stage.yaml"),

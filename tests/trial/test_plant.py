@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtcomp.trial.draw import draw_stage, look
+from rtcomp.trial.draw import look
+from rtcomp.trial.families.micrometre import draw_stage
 from rtcomp.trial.hidden import SECRETS, Rig
 from rtcomp.trial.motion import draw_reference
 from rtcomp.trial.oracle import Bare

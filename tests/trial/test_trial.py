@@ -249,6 +249,6 @@ def test_rivals_name_a_strong_plain_effect(rival: str, tmp_path: Path) -> None:
 
     case = draw(Plan("case", "one", ("drive-offset",), "full", 4))
     dump_yaml(tmp_path / "stage.yaml", case.believed)
-    write_recording(tmp_path / "train.csv.gz", case.run("train"), case.loop.resolution)
+    write_recording(tmp_path / "train.csv.gz", case.run("train"), case.loop)
     names = [e["names"][0] for e in name(rival, tmp_path)["effects"]]  # type: ignore[attr-defined]
     assert "constant-force" in names

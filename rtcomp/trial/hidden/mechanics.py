@@ -18,7 +18,8 @@ def _inertia(chance: np.random.Generator, rig: Rig) -> Sized:
 
 
 def _spring(chance: np.random.Generator, rig: Rig) -> Sized:
-    cubic = chance.random() < 0.25
+    # Of a spring that is believed, only another law is missing.
+    cubic = chance.random() < 0.25 or rig.physics.spring != 0.0
 
     def at(strength: float) -> Size:
         edge = 0.2 * rig.effort * strength
@@ -30,7 +31,17 @@ def _spring(chance: np.random.Generator, rig: Rig) -> Sized:
 
 
 def _gravity(chance: np.random.Generator, rig: Rig) -> Sized:
-    return linear("weight", either(chance) * 0.1 * rig.effort, "force")
+    if not rig.rotary:
+        return linear("weight", either(chance) * 0.1 * rig.effort, "force")
+    more, phase = 0.2 * rig.effort, chance.uniform(0.0, 2.0 * np.pi)
+    known = rig.physics.pendulum * np.exp(1j * rig.physics.pendulum_phase)
+
+    def at(strength: float) -> Size:
+        whole = known + more * strength * np.exp(1j * phase)
+        changes = {"pendulum": float(abs(whole)), "pendulum_phase": float(np.angle(whole))}
+        return changes, {"amplitude": more * strength, "phase": phase}
+
+    return Sized(at)
 
 
 def _end_stop(chance: np.random.Generator, rig: Rig) -> Sized:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rtcomp.trial.plant import Loop, Physics
+from rtcomp.trial.axis import Loop, Physics
 
 Size = tuple[dict[str, float], dict[str, float]]
 """Changes of the plant's parameters, and the true values in the stage file's words (SI units)."""
@@ -29,6 +29,7 @@ class Rig:
     volts: float
     """V, 99th percentile of the command's size."""
     seconds: float
+    rotary: bool = False
 
 
 @dataclass(frozen=True)
