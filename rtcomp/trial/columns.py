@@ -37,7 +37,8 @@ def columns_of(folder: Path) -> Columns:
     raw = np.loadtxt(folder / "train.csv.gz", delimiter=",", skiprows=1)
     content = yaml.safe_load((folder / "stage.yaml").read_text(encoding="utf-8"))
     stage: dict[str, Any] = content["stage"]
-    time, x, u = raw[:, 0], raw[:, 2], raw[:, 3]
+    # In open loop there is no reference between them.
+    time, x, u = raw[:, 0], raw[:, -2], raw[:, -1]
     rate = float(content["rate"])
     sections = butter(3, min(100.0, 0.1 * rate), fs=rate, output="sos")
 
@@ -48,17 +49,21 @@ def columns_of(folder: Path) -> Columns:
     v = np.gradient(slow) * rate
     a = np.gradient(v) * rate
     u = 0.5 * (u + np.append(u[:1], u[:-1]))
-    force = smooth(float(stage["force_constant"]) * u)
-    micro = float(stage["micro_damping_speed"])
-    elements = np.array([[e["stiffness"], e["reach"]] for e in stage["friction"]])
+    force = smooth(float(stage["force_constant"]) * u) - _known(stage, slow)
+    speed, stroke = float(np.sqrt(np.mean(v**2))), float(np.max(np.abs(slow)))
+    micro = float(stage.get("micro_damping_speed", 0.3 * speed))
+    elements = np.array([[e["stiffness"], e["reach"]] for e in stage.get("friction", [])])
+    # Where no friction is believed: one contact of a twentieth of the stroke, of no force.
+    believes = elements.size > 0
+    elements = elements if believes else np.array([[20.0 / stroke, 0.05 * stroke]])
     level = float(elements[:, 0] @ elements[:, 1])
     h = stops_along(x, elements[:, 0] / level, elements[:, 1].copy()).sum(axis=1)
     further = stops_along(x, elements[:, 0] / (1.05 * level), 1.05 * elements[:, 1]).sum(axis=1)
     slowly = np.exp(-((v / micro) ** 2)) * v
     base = np.column_stack([smooth(c) for c in (a, v, h, slowly, further - h)])
-    believed = np.array([stage["mass"], stage["viscous"], level, stage["micro_damping"], 0.0])
+    found = [stage["mass"], stage.get("viscous", 0.0), level * believes, stage.get("micro_damping", 0.0), 0.0]
+    believed = np.array(found)
     mismatch = force - base @ believed
-    speed, stroke = float(np.sqrt(np.mean(v**2))), float(np.max(np.abs(slow)))
     items: list[tuple[str, Floats]] = [
         ("constant-force", np.ones_like(v)),
         ("parallel-spring", slow), ("parallel-spring", slow**3),
@@ -96,6 +101,17 @@ def columns_of(folder: Path) -> Columns:
     keys = ("mass", "viscous", "friction.level", "micro_damping")
     moved = tuple((key, float(believed[i]), float(better[i])) for i, key in enumerate(keys))
     return Columns(left, columns, tuple(items[int(i)][0] for i in kept), moved)
+
+
+def _known(stage: dict[str, Any], x: Floats) -> Floats:
+    """Return the force (N, (K,)) of a spring and a weight that are believed, signed as friction is."""
+    force = np.zeros(x.size)
+    for entry in stage.get("effects", []):
+        if entry["name"] == "parallel-spring":
+            force += entry["stiffness"] * x
+        elif entry["name"] == "gravity":
+            force -= entry["amplitude"] * np.sin(x + entry["phase"])
+    return force
 
 
 def _period(x: Floats, rest: Floats) -> float:

@@ -50,3 +50,20 @@ def test_what_was_sealed_must_be_there_whole(published: str | None, tmp_path: Pa
         (tmp_path / "commitments.json").write_text(published)
     with pytest.raises(RtcompError, match=r"stopped\.json or commitments\.json is missing or damaged"):
         Stopped.read(tmp_path)
+
+
+def test_a_trial_with_cases_that_could_not_be_drawn_goes_on(tmp_path: Path) -> None:
+    stopped = Stopped(
+        2, 7, salts={"case0": "01"}, families=["flexure"], forms=0.5, not_drawn={"case1": "ran away"}
+    )
+    stopped.write(tmp_path)
+    (tmp_path / "commitments.json").write_text(json.dumps({"commitments": {"case0": "ab"}}))
+    assert Stopped.read(tmp_path) == stopped
+
+
+def test_a_trial_that_was_stopped_before_there_were_families_was_of_micrometre_stages(tmp_path: Path) -> None:
+    (tmp_path / "stopped.json").write_text(
+        json.dumps({"cases": 1, "seed": 7, "salts": {"case0": "01"}, "ended": {}})
+    )
+    (tmp_path / "commitments.json").write_text(json.dumps({"commitments": {"case0": "ab"}}))
+    assert Stopped.read(tmp_path).families == ["micrometre"]

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from rtcomp.trial.draw import SHARES, Case, draw, plan
+from rtcomp.trial.draw import SHARES, Case, Plan, draw, plan
+from rtcomp.trial.families import FAMILIES
 from rtcomp.trial.hidden import EFFECTS
 from rtcomp.trial.seal import verify
 
@@ -92,6 +93,65 @@ def test_a_kind_that_there_is_not_is_refused(tmp_path: Path) -> None:
     run = trial(tmp_path / "trial", "--only", "dirty", how="cogging")
     assert run.returncode == 2 and all(kind in run.stderr for kind in SHARES)
     assert not (tmp_path / "trial").exists()
+
+
+def test_a_family_that_there_is_not_is_refused(tmp_path: Path) -> None:
+    run = trial(tmp_path / "trial", "--family", "heavy-screws", how="cogging")
+    assert run.returncode == 2 and "did you mean 'heavy-screw'?" in run.stderr
+    assert len(run.stderr.splitlines()) == 1 and not (tmp_path / "trial").exists()
+
+
+def test_a_method_is_passed_on_or_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    from rtcomp.cli import diagnose as module
+    from rtcomp.cli.trial import diagnosis_command
+    from rtcomp.errors import RtcompError
+
+    assert diagnosis_command("second", "mine --fast") == ("mine", "--fast", "--method", "second")
+    assert diagnosis_command("first", "mine") == ("mine",)
+    assert diagnosis_command("second")[-3:] == ("diagnose", "--method", "second")
+    with pytest.raises(RtcompError, match="no method 'third'"):
+        diagnosis_command("third")
+    without = [p for p in module.diagnose.params if p.name != "method"]
+    monkeypatch.setattr(module.diagnose, "params", without)
+    assert diagnosis_command("first")[-1] == "diagnose"
+    with pytest.raises(RtcompError, match="there is only the first"):
+        diagnosis_command("second")
+
+
+@pytest.mark.slow
+def test_one_case_of_each_family_is_drawn_scored_and_shown(tmp_path: Path) -> None:
+    out = tmp_path / "trial"
+    count = len(FAMILIES)
+    run = trial(out, "--cases", count, "--seed", 3, "--keep", "--rivals", "none", how="cogging")
+    assert run.returncode == 0, run.stderr
+    content = checked(out, count)
+    assert set(content["families"]) == set(FAMILIES) and not content["not_drawn"]  # type: ignore[call-overload]
+    figures = {f["name"]: f for f in content["figures"]}  # type: ignore[attr-defined]
+    # Replays of all are scored: with a thin belief, in open loop, on a rotary axis.
+    assert figures["made worse"]["count"] == count and figures["made worse"]["value"] == 0.0
+    stated = {s["stated"]: s["count"] for s in content["calibration"]}  # type: ignore[attr-defined]
+    assert stated["0.9 to 0.95"] == 0 and stated["0.8 to 0.9"] == count
+    assert "By family" in run.stdout and all(name in run.stdout for name in FAMILIES)
+
+
+def test_a_case_that_cannot_be_drawn_costs_that_case_only(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    import rtcomp.trial.trial as module
+
+    def brittle(chosen: Plan) -> Case:
+        if chosen.name == "case1":
+            raise FloatingPointError("ran away")
+        return draw(chosen)
+
+    monkeypatch.setattr(module, "draw", brittle)
+    stand_in = (sys.executable, str(STAND_IN), "cogging")
+    settings = module.Settings(3, 5, 2, stand_in, (*RTCOMP, "replay"), 60.0, (), "clean")
+    done = module.trial(settings, tmp_path, lambda step, n, of: None)
+    assert [row.case.plan.name for row in done.rows] == ["case0", "case2"]
+    assert done.not_drawn == {"case1": "FloatingPointError: ran away"}
+    assert any("case1: not drawn" in note for note in done.notes)
+    assert done.to_json(settings)["not_drawn"] and not (tmp_path / "cases").exists()
 
 
 def test_a_diagnosis_that_never_ends_is_ended(tmp_path: Path) -> None:
