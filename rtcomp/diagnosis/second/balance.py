@@ -115,7 +115,9 @@ class ForceBalance:
         self.noise = noise or Noise.of(stage, data)
         share = min(1.0, self.noise.bandwidth / (0.5 * data.rate))
         self.grain = 1.5 * self.noise.rms * float(np.sqrt(share))
-        self.reaches = _grid(stage, data, self.grain)
+        self.coarse = _grid(stage, data, self.grain)
+        """Yield displacements (m) over all that the recording could show."""
+        self.reaches = self.coarse
         self.step = float(np.log(self.reaches[1] / self.reaches[0]))
         """Between yield displacements (logarithm)."""
         believed = [dict(e) for e in stage.mechanics.effects]
@@ -167,7 +169,7 @@ class ForceBalance:
     def put(self, reaches: Floats, step: float) -> None:
         """Put the grid of yield displacements (m) to `reaches`, in steps of `step` (logarithm)."""
         own = self.believed_reaches if self.believed_reaches.size <= MOST_OWN else np.zeros(0)
-        self.reaches = _joined(own[own <= self.reaches[-1]], np.unique(reaches), step)
+        self.reaches = _joined(own[own <= self.coarse[-1]], np.unique(reaches), step)
         self.step = step
         self._cache = Cache(KEPT)
 
@@ -184,10 +186,20 @@ class ForceBalance:
         return self._power(self._plain_drive())
 
     def _needed(self, segment: Segment, c: Floats) -> Floats:
-        """Return the force (N, (K,)) that a segment's motion needs, of base coefficients `c`."""
+        """Return the force (N, (K,)) that a segment's motion needs, of coefficients `c` of the belief."""
         path = self._path(segment, [], smooth=False)
         units = self._units(segment, path, [], [], None)
-        return np.asarray(path.measured * c[0] + units @ c[1 : self.size])
+        force = path.measured * c[0] + units @ c[1 : self.size]
+        made = [ent.build(one) for e in self.believed for one in ent.basis(e)]
+        for effect, size in zip(made, c[self.size :], strict=True):
+            force += size * self._force_of(effect, segment, path)
+        return np.asarray(force)
+
+    def _force_of(self, effect: Effect, segment: Segment, path: Path) -> Floats:
+        """Return the force (N, (K,)) that the motion needs for an effect that adds one."""
+        given = self._given(segment)
+        f = forces(self.stage, [effect], segment.time, path.x, path.v, path.a, given, self.grain)
+        return np.asarray(-f.others() - around_rows(f.drive))
 
     def _cut_blocks(self) -> None:
         assert self._whitening is not None
@@ -481,11 +493,8 @@ class ForceBalance:
         effect = ent.build(entry)
 
         def made() -> list[Floats]:
-            found = []
-            for s, p in zip(self.data.segments, self.paths(sensors), strict=True):
-                f = forces(self.stage, [effect], s.time, p.x, p.v, p.a, self._given(s), self.grain)
-                found.append(-f.others() - around_rows(f.drive))
-            return found
+            pairs = zip(self.data.segments, self.paths(sensors), strict=True)
+            return [self._force_of(effect, s, p) for s, p in pairs]
 
         return _Group(("added", _key([effect]), _key(sensors)), made)
 

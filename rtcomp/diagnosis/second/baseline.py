@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import BASE, ForceBalance
-from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.diagnosis.second.fit import Fitted, Fitter, Term
 from rtcomp.kernels import Floats
 
 DENSE = 64
@@ -17,23 +20,30 @@ SLIGHT = 1e-3
 
 
 def baseline(balance: ForceBalance) -> Fitted:
-    """Whiten `balance`, settle its grid of yield displacements, and return the refitted belief.
+    """Whiten `balance`, settle its grid of yield displacements, and return the refitted belief."""
+    m = balance.stage.mechanics
+    sizes = [float(size) for entry in balance.believed for size in ent.sizes_of(entry)]
+    balance.whiten(np.array([m.mass, m.viscous, m.micro_damping, *balance.weights, *sizes]))
+    fitter = Fitter(balance)
+    settle(fitter)
+    balance.whiten(fitter.fit([]).coefficients)
+    settle(fitter)
+    return fitter.fit([])
+
+
+def settle(fitter: Fitter, terms: Sequence[Term] = ()) -> None:
+    """Put the grid of yield displacements where a model of `terms` has friction.
 
     Stiffnesses that must not be negative come out sparse: of a dense grid, a dozen units are not zero. These
     are kept beside the believed ones and a coarse grid, so that candidates find friction that can give way.
     """
-    m = balance.stage.mechanics
-    believed = np.array([m.mass, m.viscous, m.micro_damping, *balance.weights])
-    fitter = Fitter(balance)
-    balance.whiten(believed)
-    coarse = balance.reaches
+    balance = fitter.balance
+    coarse = balance.coarse
     step = float(np.log(coarse[-1] / coarse[0])) / (DENSE - 1)
-    dense = np.geomspace(coarse[0], coarse[-1], DENSE)
+    dense, kept = np.geomspace(coarse[0], coarse[-1], DENSE), np.zeros(0)
     for _ in range(2):
         balance.put(dense, step)
-        fitted = fitter.fit([])
-        balance.whiten(fitted.coefficients)
-        kept = _needed(balance, fitter.fit([]))
+        kept = _needed(balance, fitter.fit(terms, steps=0))
         step /= FINER
         around = np.exp(np.log(kept)[:, None] + step * np.arange(1 - FINER, FINER)[None, :]).ravel()
         dense = np.unique(around[(around >= coarse[0]) & (around <= coarse[-1])])
@@ -42,9 +52,6 @@ def baseline(balance: ForceBalance) -> Fitted:
     skeleton = coarse[::2]
     far = np.array([not kept.size or np.min(np.abs(np.log(kept / r))) > step * FINER for r in skeleton])
     balance.put(np.concatenate([kept, skeleton[far]]), step * FINER)
-    fitted = fitter.fit([])
-    balance.whiten(fitted.coefficients)
-    return fitter.fit([])
 
 
 def _needed(balance: ForceBalance, fitted: Fitted) -> Floats:

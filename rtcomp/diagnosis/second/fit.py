@@ -162,7 +162,9 @@ class Fitter:
         """Fit a model from the values that its terms have; raise ConfigError where these are impossible."""
         b = self.balance
         current = list(terms)
-        weights = b.weights if start is None or _newly_behind(terms, start) else start.weights
+        weights = b.weights
+        if start is not None and start.weights.size == b.reaches.size and not _newly_behind(terms, start):
+            weights = start.weights
         rows = np.isin(b.block, np.flatnonzero(self.use))
         variance = 1.0 if start is None else start.variance
         for _ in range(2):
@@ -245,7 +247,7 @@ class Fitter:
                     continue
                 value, most = float(term.entry[p.name]), p.high
                 log = p.lowest >= 0.0 and value > 0.0
-                step = 0.02 if log else max(0.02 * abs(value), 1e-9)
+                step = 0.02 if log else max(0.02 * abs(value), 1e-9 * (high - low if p.unit == "m" else 1.0))
                 if p.unit == ent.PHASE:
                     step = 0.05
                 elif p.name == ent.PERIOD:
@@ -253,7 +255,7 @@ class Fitter:
                     step, most = min(0.02, 0.02 * value / (high - low)), min(p.high, LONGEST * (high - low))
                 elif waves and p.unit == "Hz":
                     step = min(0.02, 0.01 / (value * self.balance.data.seconds))
-                elif p.unit == "m" and p.lowest < 0.0:
+                elif p.unit == "m" and p.lowest < 0.0 and p.name not in kind.linear:
                     step = 0.002 * (high - low)
                 found.append(Free(i, p.name, p.lowest, most, log, step))
         return found

@@ -11,6 +11,7 @@ import numpy as np
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import ForceBalance
+from rtcomp.diagnosis.second.baseline import settle
 from rtcomp.diagnosis.second.candidates import Candidate, candidates, started
 from rtcomp.diagnosis.second.fit import Fitted, Fitter, Term
 from rtcomp.diagnosis.second.replicates import best, free_columns, null_of
@@ -21,6 +22,9 @@ from rtcomp.errors import ConfigError
 
 SCANNED = 14
 """Values of a length that are tried where first order is no guide."""
+
+NEAR = 1.0
+"""Logarithm of the error over the best one's, up to which a model is kept as an alternative."""
 
 Say = Callable[[float, str], None]
 
@@ -81,7 +85,25 @@ def search(fitter: Fitter, baseline: Fitted, ends: float, say: Say, seed: int = 
         beam = [m for m in _distinct(sorted(next_beam, key=_score)) if _score(m) < _score(found.chosen)]
         if not beam:
             break
+        beam, grown = _resettled(fitter, found, beam, grown, parents)
+        everything = float(found.baseline.errors.sum())
     return found
+
+
+def _resettled(
+    fitter: Fitter, found: Search, beam: list[Fitted], grown: list[Fitted], parents: dict[int, float]
+) -> tuple[list[Fitted], list[Fitted]]:
+    """Refit all on yield displacements that suit the best model: those of a poorer one were bent to it.
+
+    Of the models that were `grown`, those that come near the best.
+    """
+    settle(fitter, beam[0].terms)
+    found.baseline = fitter.fit([])
+    again = [fitter.fit(m.terms, m) for m in beam]
+    parents.update({id(new): parents[id(old)] for new, old in zip(again, beam, strict=True)})
+    near = [g for g in sorted(grown, key=_score) if all(g is not m for m in beam)]
+    near = [g for g in near if _score(g) < _score(beam[0]) + NEAR][:BEAM]
+    return sorted(again, key=_score), [*again, *(fitter.fit(g.terms, g) for g in near)]
 
 
 @dataclass(frozen=True)
@@ -173,8 +195,8 @@ def _accepted(model: Fitted, parent: Fitted, null: Null | None, everything: floa
     if null is None:
         return False
     p = null.p_value(log_gain(parent.errors, model.errors))
-    gained = np.sqrt(parent.errors.sum()) - np.sqrt(model.errors.sum())
-    return p < LEVEL and bool(gained > LEAST_GAIN * np.sqrt(everything))
+    gained = float(parent.errors.sum() - model.errors.sum())
+    return p < LEVEL and gained > LEAST_GAIN * everything
 
 
 def _parent(model: Fitted, beam: Sequence[Fitted]) -> Fitted:
