@@ -11,6 +11,10 @@ from rtcomp.trial.axis import Loop, Physics
 from rtcomp.trial.families.family import Family, Motion, log_uniform, pid
 
 
+SIGHT = 40.0
+"""Hz; above, counts of a heavy mass's acceleration are larger than the forces of its moves."""
+
+
 def draw_stage(chance: np.random.Generator) -> tuple[Loop, Physics, Motion]:
     """Draw an axis of 0.1 to 0.8 t, its loop and how it is to move."""
     rate = float(chance.choice([500.0, 1000.0]))
@@ -31,7 +35,7 @@ def draw_stage(chance: np.random.Generator) -> tuple[Loop, Physics, Motion]:
     motion = {
         "seconds": chance.uniform(30.0, 60.0), "stroke": stroke, "speed": speed, "acceleration": acceleration,
     }  # fmt: skip
-    return Loop(*gains, rate, 0.3 * resolution, resolution), physics, motion
+    return Loop(*gains, rate, 0.3 * resolution, resolution, cut=SIGHT), physics, motion
 
 
 def moves(chance: np.random.Generator, loop: Loop, motion: Motion) -> Floats:

@@ -62,4 +62,6 @@ def command(chance: np.random.Generator, loop: Loop, motion: Motion) -> Floats:
 FAMILY = Family(
     "open-loop", "axis on a spring driven by a multisine, a chirp or steps", draw_stage, command,
     believed_springs,
+    # Beside a spring another scale of the sensor is another gain and another reach.
+    lacks=frozenset({"sensor-scale"}),
 )  # fmt: skip
