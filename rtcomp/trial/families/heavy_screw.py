@@ -10,7 +10,6 @@ from rtcomp.kernels import Floats
 from rtcomp.trial.axis import Loop, Physics
 from rtcomp.trial.families.family import Family, Motion, log_uniform, pid
 
-
 SIGHT = 40.0
 """Hz; above, counts of a heavy mass's acceleration are larger than the forces of its moves."""
 
