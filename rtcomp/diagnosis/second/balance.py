@@ -139,8 +139,18 @@ class ForceBalance:
 
     @property
     def size(self) -> int:
-        """Columns of the base: mass, damping, friction units."""
-        return len(BASE) + self.reaches.size
+        """Columns of the base: mass, damping, friction units, and last a constant force."""
+        return len(BASE) + self.reaches.size + 1
+
+    @property
+    def friction(self) -> slice:
+        """Columns of the friction units, in the order of `reaches`."""
+        return slice(len(BASE), len(BASE) + self.reaches.size)
+
+    @property
+    def biased(self) -> bool:
+        """Tell whether the belief has a constant force, which is refitted."""
+        return any(ent.kind_of(e).bias for e in self.believed)
 
     def without(self, number: str) -> bool:
         """Tell whether the belief denies a number of the base: it has friction, but none of this kind.
@@ -189,7 +199,7 @@ class ForceBalance:
         """Return the force (N, (K,)) that a segment's motion needs, of coefficients `c` of the belief."""
         path = self._path(segment, [], smooth=False)
         units = self._units(segment, path, [], [], None)
-        force = path.measured * c[0] + units @ c[1 : self.size]
+        force = path.measured * c[0] + units @ c[1 : self.size - 1]
         made = [ent.build(one) for e in self.believed for one in ent.basis(e)]
         for effect, size in zip(made, c[self.size :], strict=True):
             force += size * self._force_of(effect, segment, path)
@@ -322,8 +332,10 @@ class ForceBalance:
             if self._whitening is None:
                 parts.append(table[:, 3:-3])
                 continue
-            white = filtered(table, self.data.rate, self._whitening.response)
-            parts.append(white[:, self._whitening.rows(white.shape[1])])
+            # What the ends have wrong would be drawn out over all that a filter remembers.
+            lead, rows = self._whitening.lead, self._whitening.rows(table.shape[1])
+            white = filtered(table[:, lead:-lead], self.data.rate, self._whitening.response)
+            parts.append(white[:, rows.start - lead : rows.stop - lead : rows.step])
         return np.concatenate(parts, axis=1)
 
     def both_sides(self, stage: Stage) -> tuple[Floats, Floats]:
@@ -346,10 +358,12 @@ class ForceBalance:
 
     def smooth(self, signals: Sequence[Floats]) -> Floats:
         """Return signals (K,), one a segment, below the motion's bandwidth on the compared rows, (n,)."""
-        rate = self.data.rate
-        return np.concatenate(
-            [filtered(s, rate, self.noise.wiener)[self.whitening.rows(s.size)] for s in signals]
-        )
+        parts = []
+        for s in signals:
+            lead, rows = self.whitening.lead, self.whitening.rows(s.size)
+            below = filtered(s[lead:-lead], self.data.rate, self.noise.wiener)
+            parts.append(below[rows.start - lead : rows.stop - lead : rows.step])
+        return np.concatenate(parts)
 
     def plain(self, signals: Sequence[Floats]) -> Floats:
         """Return one unfiltered number a compared row, (n,), of signals (K,), one a segment."""
@@ -402,7 +416,7 @@ class ForceBalance:
         adding: Sequence[Effect],
         weights: Floats | None,
     ) -> list[_Group]:
-        """Return the base's columns: mass; damping and friction units."""
+        """Return the base's columns: mass; damping and friction units; a constant force."""
         whole = any(e.whole_friction for e in modifiers)
         play = next((e for e in bodies if e.behind and _active(e)), None)
         hung = [e for e in bodies if not e.behind]
@@ -444,6 +458,7 @@ class ForceBalance:
         return [
             _Group(("mass", _key(hung), _key(sensors), behind), mass),
             _Group(("units", _key(before), _key(modifiers), _key(sensors), behind, own), units),
+            _Group(("offset",), lambda: [np.ones(s.time.size) for s in self.data.segments]),
         ]
 
     def _load(self, sensors: Sequence[Effect], play: Effect, weights: Floats | None) -> list[Floats]:

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from rtcomp.diagnosis.second import entries as ent
-from rtcomp.diagnosis.second.balance import BASE, ForceBalance
+from rtcomp.diagnosis.second.balance import ForceBalance
 from rtcomp.diagnosis.second.fit import Fitted, Fitter, Term
+from rtcomp.diagnosis.second.settings import LEAST_GAIN
 from rtcomp.kernels import Floats
 
 DENSE = 64
@@ -23,12 +24,26 @@ def baseline(balance: ForceBalance) -> Fitted:
     """Whiten `balance`, settle its grid of yield displacements, and return the refitted belief."""
     m = balance.stage.mechanics
     sizes = [float(size) for entry in balance.believed for size in ent.sizes_of(entry)]
-    balance.whiten(np.array([m.mass, m.viscous, m.micro_damping, *balance.weights, *sizes]))
+    balance.whiten(np.array([m.mass, m.viscous, m.micro_damping, *balance.weights, 0.0, *sizes]))
     fitter = Fitter(balance)
     settle(fitter)
     balance.whiten(fitter.fit([]).coefficients)
     settle(fitter)
     return fitter.fit([])
+
+
+def with_offset(fitter: Fitter, fitted: Fitted) -> Fitted:
+    """Return the belief refitted beside a constant force where that matters too little to be named.
+
+    No axis is free of one: of a current loop, a cable, a position whose zero is not that of a spring.
+    """
+    fitter.offset = True
+    beside = fitter.fit([])
+    gained = float(fitted.errors.sum() - beside.errors.sum())
+    if 0.0 < gained < LEAST_GAIN * float(fitted.errors.sum()):
+        return beside
+    fitter.offset = False
+    return fitted
 
 
 def settle(fitter: Fitter, terms: Sequence[Term] = ()) -> None:
@@ -56,5 +71,5 @@ def settle(fitter: Fitter, terms: Sequence[Term] = ()) -> None:
 
 def _needed(balance: ForceBalance, fitted: Fitted) -> Floats:
     """Return the yield displacements of a fit that hold a part of the friction."""
-    force = fitted.coefficients[len(BASE) : balance.size] * balance.reaches
+    force = fitted.coefficients[balance.friction] * balance.reaches
     return balance.reaches[force > SLIGHT * max(float(force.sum()), 1e-300)]

@@ -138,6 +138,11 @@ def searchable(balance: ForceBalance) -> Iterator[type[Effect]]:
             yield kind
 
 
+def _only_bias(kind: type[Effect], balance: ForceBalance) -> bool:
+    """Tell whether a constant force is all that an effect can be on this axis."""
+    return kind.bias and (balance.stage.axis != "rotary" or len(kind.linear) < 2)
+
+
 def _denied(balance: ForceBalance, number: str) -> bool:
     return number in BASE and balance.without(number)
 
@@ -145,14 +150,21 @@ def _denied(balance: ForceBalance, number: str) -> bool:
 def candidates(balance: ForceBalance, fitted: Fitted, taken: Sequence[str] = ()) -> list[Candidate]:
     """Return every candidate beside a fitted model, with the columns it would add to it."""
     scales = Scales.of(balance, fitted)
-    work = [
-        (kind, point)
-        for kind in searchable(balance)
-        if kind.name not in taken
-        for point in _points(kind, scales, balance)
+    offset = fitted.coefficients[balance.size - 1] != 0.0
+    kinds = [
+        k for k in searchable(balance) if k.name not in taken and not (offset and _only_bias(k, balance))
     ]
-    made = shared(lambda item: _candidate(balance, fitted, *item), work)
-    return [c for c in made if c is not None]
+    points = {k: list(_points(k, scales, balance)) for k in kinds}
+
+    def make(item: tuple[type[Effect], tuple[Entry, str]]) -> Candidate | None:
+        return _candidate(balance, fitted, *item)
+
+    # What changes nothing at its first point (friction, where there is none) is not tried at the others.
+    first = shared(make, [(kind, found[0]) for kind, found in points.items() if found])
+    shown = [c for c in first if c is not None]
+    names = {c.name for c in shown}
+    rest = [(kind, point) for kind, found in points.items() for point in found[1:] if kind.name in names]
+    return [*shown, *(c for c in shared(make, rest) if c is not None)]
 
 
 def _points(kind: type[Effect], scales: Scales, balance: ForceBalance) -> Iterator[tuple[Entry, str]]:

@@ -12,8 +12,10 @@ from rtcomp.kernels import Floats
 from rtcomp.recording.pieces import bridged
 from rtcomp.recording.reader import Recording
 
-MOST_ROWS = 120_000
+MOST_ROWS = 60_000
 """Rows of the recording that are used as they are; of longer ones windows are taken, evenly spread."""
+OVERSAMPLED = 10.0
+"""Rate over the motion's bandwidth, from which on rows are averaged."""
 WINDOWS = 6
 """Windows of a long recording."""
 
@@ -40,6 +42,8 @@ class Data:
     segments: tuple[Segment, ...]
     rate: float
     held: bool
+    averaged: int = 1
+    """Rows of the recording in one of these."""
 
     @property
     def period(self) -> float:
@@ -62,16 +66,22 @@ class Data:
         return replace(self, held=held)
 
 
-def load_data(recordings: Sequence[Recording], *, held: bool = True) -> Data:
-    """Return the recordings (of one rate) as segments: without long gaps, windows of very long ones."""
+def load_data(recordings: Sequence[Recording], *, held: bool = True, bandwidth: float = 0.0) -> Data:
+    """Return the recordings (of one rate) as segments: without long gaps, windows of very long ones.
+
+    Where the `bandwidth` (Hz) of the motion is known, rows far beyond it are averaged.
+    """
     rate = recordings[0].rate_hz
     found = [s for r in recordings for s in _segments(r)]
+    factor = max(1, int(rate / (OVERSAMPLED * bandwidth))) if bandwidth else 1
+    if factor > 1:
+        found, rate = [averaged(s, factor) for s in found], rate / factor
     rows = sum(s.time.size for s in found)
     if rows > MOST_ROWS:
         size = MOST_ROWS // WINDOWS
         share = max(WINDOWS // len(found), 1)
         found = [w for s in found for w in _windows(s, share, size)]
-    return Data(tuple(found), rate, held)
+    return Data(tuple(found), rate, held, factor)
 
 
 def _segments(recording: Recording) -> list[Segment]:
@@ -80,6 +90,20 @@ def _segments(recording: Recording) -> list[Segment]:
     whole = Segment(time, position, recording.voltage, recording.reference)
     found = [whole.part(rows) for rows in stretches(recording.trusted)]
     return [s for s in found if s.time.size >= LEAST_ROWS // 2] or [whole]
+
+
+def averaged(segment: Segment, factor: int) -> Segment:
+    """Return means of so many rows each; a command is held from the middle of its rows to the next."""
+    count = segment.time.size // factor
+
+    def mean(a: Floats) -> Floats:
+        return np.asarray(a[: count * factor].reshape(count, factor).mean(axis=1))
+
+    given = np.concatenate([[0.0], np.cumsum(segment.voltage)])
+    edges = np.arange(count + 1) * factor + 0.5 * (factor - 1)
+    held = np.diff(np.interp(edges, np.arange(given.size), given)) / factor
+    reference = None if segment.reference is None else mean(segment.reference)
+    return Segment(mean(segment.time), mean(segment.position), held, reference)
 
 
 def _windows(segment: Segment, count: int, rows: int) -> list[Segment]:

@@ -28,6 +28,8 @@ LONGEST = 1.25
 """Longest period of a wave, relative to the stroke."""
 SETTLED = 1e-4
 """Relative gain of a step below which the fit ends."""
+AT_BOUND = 1e-3
+"""Part of a number by which it may be away from its bound and still be at it."""
 ONCE = 0.5
 """Part of a column's power in one block, from which on the other blocks cannot tell its size."""
 
@@ -66,6 +68,12 @@ class Free:
         value = float(terms[self.term].entry[self.name])
         return math.log(value) if self.log else value
 
+    def at_bound(self, terms: Sequence[Term]) -> bool:
+        """Tell whether it is as large or as small as it may be."""
+        value = float(terms[self.term].entry[self.name])
+        near = AT_BOUND * abs(value)
+        return value >= self.high - near or 0.0 < self.low >= value - near
+
     def put(self, terms: list[Term], value: float) -> None:
         """Give it a value on that scale, within its bounds."""
         plain = math.exp(value) if self.log else value
@@ -98,6 +106,12 @@ class Fitted:
     """N/m of the friction units."""
 
     @property
+    def at_bound(self) -> bool:
+        """Tell whether a nonlinear parameter of the last term came out at its bound."""
+        last = len(self.terms) - 1
+        return any(f.at_bound(self.terms) for f in self.free if f.term == last)
+
+    @property
     def entries(self) -> list[Entry]:
         """Return the entries with the values found."""
         return [t.entry for t in self.terms]
@@ -108,6 +122,8 @@ class Fitter:
 
     def __init__(self, balance: ForceBalance) -> None:
         self.balance = balance
+        self.offset = False
+        """Whether a constant force that nobody believes is fitted beside every model."""
         self._believed = [Term.of(e) for e in balance.believed]
 
     @property
@@ -128,6 +144,10 @@ class Fitter:
             elif balance.without(BASE[i]):
                 high[i] = 0.0
         low[0] = 1e-3 * m.mass
+        if self.offset and not balance.biased and not any(ent.kind_of(t.entry).bias for t in terms):
+            low[balance.size - 1] = -np.inf
+        else:
+            high[balance.size - 1] = 0.0
         for term, span in zip([*self._believed, *terms], system.of_entry, strict=True):
             if span.stop > span.start:
                 low[span], high[span] = ent.bounds_of(term.entry)
@@ -155,7 +175,7 @@ class Fitter:
         weights = self.balance.weights
         for _ in range(2):
             _, _, _, c, sse = self.solve(terms, weights, 1.0)
-            weights = c[len(BASE) : self.balance.size]
+            weights = c[self.balance.friction]
         return sse
 
     def fit(self, terms: Sequence[Term], start: Fitted | None = None, steps: int = STEPS) -> Fitted:
@@ -170,7 +190,7 @@ class Fitter:
         for _ in range(2):
             system, prior, _, c, sse = self.solve(current, weights, variance)
             variance = sse / max(int(rows.sum()), 1)
-            weights = c[len(BASE) : b.size]
+            weights = c[b.friction]
         free = self._free(current)
         damping = 1e-3
         tangents = np.zeros((0, system.y.size))
@@ -201,7 +221,7 @@ class Fitter:
             gained = 1.0 - found[-1] / sse
             current = trial
             system, prior, _grams, c, sse = found
-            weights = c[len(BASE) : b.size]
+            weights = c[b.friction]
             variance = sse / max(int(rows.sum()), 1)
             damping = max(0.1 * damping, 1e-6)
             free = self._free(current)

@@ -125,7 +125,7 @@ def numbers(balance: ForceBalance, believed: Stage, fitted: Fitted, worse: float
     reaches = balance.reaches
 
     def of(c: Floats) -> Floats:
-        elements = list(zip(c[len(BASE) : balance.size], reaches, strict=True))
+        elements = list(zip(c[balance.friction], reaches, strict=True))
         return np.array([*c[: len(BASE)], *level_and_reach(elements)])
 
     values = of(fitted.coefficients)

@@ -14,6 +14,11 @@ from rtcomp.stage.stage import Stage
 TOP = 0.1
 """Weight, relative to the largest, below which a frequency is left out of the table of rows."""
 
+LEAD = 2
+"""Rows at the ends of a segment that second differences do not do justice to."""
+RINGING = 100
+"""Rows at the ends of a band-limited segment that derivatives do not do justice to."""
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -55,8 +60,10 @@ class Whitening:
     white: Response
     """The first of its two factors: one over the amplitude density of noise in the residual."""
     thinning: int
+    lead: int
+    """Rows at both ends of a segment whose derivatives are not right: cut before filtering."""
     edge: int
-    """Rows at both ends of a segment that are left out."""
+    """Rows at both ends of a segment that are left out, those included."""
 
     @classmethod
     def of(cls, noise: Noise, data: Data, shaken: list[Floats]) -> Whitening:
@@ -74,7 +81,8 @@ class Whitening:
         above = np.flatnonzero(noise.wiener(frequency) > TOP)
         high = float(frequency[above[-1]]) if above.size else float(frequency[-1])
         thinning = max(1, int(data.rate / (2.5 * high)))
-        return cls(response, white, thinning, max(3, int(2.0 * data.rate / high)))
+        lead = LEAD if data.held else RINGING
+        return cls(response, white, thinning, lead, lead + max(1, int(2.0 * data.rate / high)))
 
     def rows(self, size: int) -> slice:
         """Return the rows of a segment of `size` rows that are compared."""

@@ -10,10 +10,11 @@ from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.result import Diagnosis, Place
 from rtcomp.diagnosis.second.answer import answer
 from rtcomp.diagnosis.second.balance import ForceBalance
-from rtcomp.diagnosis.second.baseline import baseline
+from rtcomp.diagnosis.second.baseline import baseline, with_offset
 from rtcomp.diagnosis.second.confidence import alternatives
 from rtcomp.diagnosis.second.data import load_data
 from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.diagnosis.second.noise import Noise
 from rtcomp.diagnosis.second.selection import search
 from rtcomp.diagnosis.second.settings import BUDGET
 from rtcomp.diagnosis.second.significance import log_gain
@@ -57,6 +58,7 @@ def diagnose(
         left = (base.sse / max(balance.power, 1e-300)) ** 0.5
         located(left, locate(view, before, None, seed, stage.axis))
     fitter = Fitter(balance)
+    base = with_offset(fitter, base)
     say(1.0, "balance")
     found = search(fitter, base, ends, say, seed)
     say(0.0, "tell apart")
@@ -75,7 +77,9 @@ def _objective(
     ways = [True, False] if held is None else [held]
     made = []
     for way in ways:
-        balance = ForceBalance(stage, load_data(recordings, held=way))
+        data = load_data(recordings, held=way)
+        bandwidth = Noise.of(stage, data).bandwidth
+        balance = ForceBalance(stage, load_data(recordings, held=way, bandwidth=bandwidth))
         made.append((balance, baseline(balance)))
     if len(made) == 1:
         return (*made[0], [])

@@ -37,9 +37,9 @@ def replicate(stage: Stage, data: Data, motion: list[Floats], noise: float, seed
     """
     random = np.random.default_rng(seed)
     low, high = data.stroke
-    counts = stage.sensor.resolution
+    counts = stage.sensor.resolution if data.averaged == 1 else 0.0  # the mean of counts is finer
     rest = max(math.sqrt(max(noise**2 - counts**2 / 12.0, 0.0)), DITHER * counts)
-    stage = stage.with_changes(sensor={"noise": rest})
+    stage = stage.with_changes(sensor={"noise": rest, "resolution": counts})
     made: list[Segment] = []
     for segment, x in zip(data.segments, motion, strict=True):
         position, voltage = _simulated(stage, data, segment, x, random)
@@ -77,6 +77,7 @@ def _simulated(
     finer = 1 if data.held else FINER
     if finer > 1:
         target, command = _between(target, finer), _between(command, finer)
+        command = 0.5 * (command + np.append(command[1:], command[-1:]))  # held from here to the next
     period = data.period / finer
     steps = max(1, math.ceil(period / largest_step(stage) - 1e-9))
     base = np.array([stage.mass, stage.force_constant, largest_stiffness(stage), 0.0])
@@ -94,7 +95,10 @@ def _simulated(
         moving.steps, moving.p, moving.s, sensing.steps, sensing.p, sensing.s, w, base, gains, state, target,
         command, random.standard_normal(target.size), finer == 1, stage.voltage_limit, period, steps, out,
     )  # fmt: skip
-    return out[0, ::finer].copy(), out[1, ::finer].copy()
+    volts = out[1]
+    if finer > 1:  # what acts at a row is the mean of what was held before and after it
+        volts = 0.5 * (volts + np.append(volts[:1], volts[:-1]))
+    return out[0, ::finer].copy(), volts[::finer].copy()
 
 
 def _between(signal: Floats, finer: int) -> Floats:

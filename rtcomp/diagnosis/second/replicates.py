@@ -46,7 +46,9 @@ def null_of(balance: ForceBalance, fitted: Fitted, screen: Screen, gain: float, 
         if data is None:
             return None
         other = balance.on(data)
-        again = Fitter(other).fit(list(fitted.terms), fitted, steps=0)
+        fitter = Fitter(other)
+        fitter.offset = fitted.coefficients[balance.size - 1] != 0.0
+        again = fitter.fit(list(fitted.terms), fitted, steps=0)
         gains = screen.gains(free_columns(again), again.residual)
         scale = balance.power / max(other.power, 1e-300)
         return max(s.gain for s in gains), float(again.errors.sum()) * scale

@@ -192,7 +192,7 @@ def _scanned(fitter: Fitter, model: Fitted, term: Term, ends: float) -> Term | N
 
 def _accepted(model: Fitted, parent: Fitted, null: Null | None, everything: float) -> bool:
     """Tell whether the last effect of a model passes the one test and matters."""
-    if null is None:
+    if null is None or model.at_bound:
         return False
     p = null.p_value(log_gain(parent.errors, model.errors))
     gained = float(parent.errors.sum() - model.errors.sum())

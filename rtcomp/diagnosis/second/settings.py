@@ -3,9 +3,9 @@
 LEVEL = 0.01
 """Level of the one test: share of recordings with nothing missing in which an effect is named."""
 
-LEAST_GAIN = 0.02
-"""Least part of the initial squared error that an effect must remove. Below it an effect may be real, but does
-not matter: a kernel is right to a tenth of its force, and a further effect must stand above that."""
+LEAST_GAIN = 0.05
+"""Least part of the initial squared error that an effect must remove. Below it an effect may be real, but
+does not matter: a kernel is right to a tenth of its force, and a further effect must stand above that."""
 
 REPLICATES = 19
 """Bootstrap replicates behind the null distribution: more make its tail surer and the answer later."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 import scipy.fft
@@ -34,14 +35,20 @@ def filtered(rows: Floats, rate: float, response: Response, *, derivative: bool 
     line = level + slope * np.arange(long.shape[1])
     count = scipy.fft.next_fast_len(long.shape[1], real=True)
     spectrum = scipy.fft.rfft(long - line, n=count, axis=1)
-    frequency: Floats = np.asarray(np.fft.rfftfreq(count, 1.0 / rate), dtype=np.float64)
-    gain = np.asarray(response(frequency), dtype=np.complex128)
-    at_rest = float(np.real(gain[0]))
+    gain = _gain(response, count, rate)
+    at_rest = float(gain[0])
     if derivative:
-        gain = gain * (2j * np.pi * frequency)
+        gain = gain * (2j * np.pi * np.fft.rfftfreq(count, 1.0 / rate))
     out = scipy.fft.irfft(spectrum * gain, n=count, axis=1)[:, pad : pad + size]
     out += at_rest * (slope * rate if derivative else line[:, pad : pad + size])
     return np.asarray(out.reshape(rows.shape))
+
+
+@lru_cache(maxsize=32)
+def _gain(response: Response, count: int, rate: float) -> Floats:
+    """Return a response at the frequencies of a transform of `count` rows."""
+    frequency: Floats = np.asarray(np.fft.rfftfreq(count, 1.0 / rate), dtype=np.float64)
+    return np.asarray(response(frequency))
 
 
 def spectrum(rows: list[Floats], rate: float) -> tuple[Floats, Floats]:

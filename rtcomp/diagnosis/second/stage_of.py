@@ -12,6 +12,7 @@ from rtcomp.diagnosis.second.balance import BASE, ForceBalance
 from rtcomp.diagnosis.second.entries import Entry
 from rtcomp.diagnosis.second.fit import Fitted
 from rtcomp.kernels import Floats
+from rtcomp.physics import catalogue
 from rtcomp.stage.stage import Stage
 
 SLIGHT = 1e-6
@@ -29,7 +30,7 @@ def stage_of(balance: ForceBalance, fitted: Fitted, *, between: bool = False) ->
     mechanics: dict[str, Any] = data["stage"]
     for key, value in zip(BASE, c, strict=False):
         mechanics[key] = float(max(value, 0.0))
-    stiffness, reaches = c[len(BASE) : balance.size], balance.reaches
+    stiffness, reaches = c[balance.friction], balance.reaches
     if between:
         stiffness, reaches = _between(balance, stiffness)
     level = stiffness * reaches
@@ -50,11 +51,20 @@ def stage_of(balance: ForceBalance, fitted: Fitted, *, between: bool = False) ->
     for entry in mechanics.get("effects", []):
         span = by_content.get(repr(dict(entry)))
         believed.append(dict(entry) if span is None else ent.composed(entry, c[span]))
-    effects = merged([*believed, *fitted.entries])
+    offset = float(c[balance.size - 1])
+    constant: list[Entry] = [bias_entry(-offset)] if offset != 0.0 else []
+    effects = merged([*believed, *constant, *fitted.entries])
     mechanics["effects"] = effects
     if not effects:
         del mechanics["effects"]
     return Stage.from_dict(data)
+
+
+def bias_entry(force: float) -> Entry:
+    """Return the catalogue's plainest constant force (N)."""
+    kinds = [k for k in catalogue.entries() if k.bias and ent.adds_force(k)]
+    kind = min(kinds, key=lambda k: len(k.parameters))
+    return {"name": kind.name, kind.linear[0]: force}
 
 
 def _between(balance: ForceBalance, stiffness: Floats) -> tuple[Floats, Floats]:
