@@ -16,6 +16,7 @@ from rtcomp.trial.calibrate import Grown, grow
 from rtcomp.trial.families import FAMILIES, Family
 from rtcomp.trial.hidden import SECRETS, Rig, Secret
 from rtcomp.trial.hidden.forms import FORMS, Form, in_form
+from rtcomp.trial.oracle import Bare
 from rtcomp.trial.plant import Run, simulate
 from rtcomp.trial.stagefile import stage_file
 
@@ -25,6 +26,8 @@ WEAK = 0.3
 """Strength of the weak tier, relative to the full one."""
 STRENGTHS = (0.0167, 0.30)
 """Rms force of an effect over that of the motion, full tier: from, to."""
+ABOVE_FLOOR = 2.5
+"""Least strength of the full tier, relative to what noise and sampling leave."""
 SATURATED = 0.05
 """Part of the rows with the command at its limit beyond which the stage is drawn again."""
 FOLLOWS = 0.5
@@ -247,9 +250,11 @@ def _drawn(plan: Plan, chance: np.random.Generator) -> Case:
         clean = _sound(case, "train")
         rig = look(physics, loop, motion, clean, family.rotary)
     forms = np.random.default_rng([plan.seed, 3])
+    least = _least(plan, Bare.of(physics, loop, clean))
     hidden = []
     for secret in secrets:
         target = math.exp(chance.uniform(*np.log(STRENGTHS))) * (WEAK if plan.tier == "weak" else 1.0)
+        target = max(target, least)
         form = _form(plan, secret, forms)
         sized = secret.draw(chance, rig) if form is None else in_form(form, secret, chance, rig)
         one = grow(secret, sized, rig, case.reference("train"), clean, target)
@@ -263,6 +268,13 @@ def _drawn(plan: Plan, chance: np.random.Generator) -> Case:
     for which in _WHICH:
         _sound(whole, which)
     return whole
+
+
+def _least(plan: Plan, bare: Bare) -> float:
+    """Return the least strength aimed at: a coarse sensor hides small effects, which would tell nothing."""
+    if plan.family == "micrometre":  # drawn as it was before this was asked
+        return 0.0
+    return ABOVE_FLOOR * (WEAK if plan.tier == "weak" else 1.0) * bare.floor / bare.needed
 
 
 def _form(plan: Plan, secret: Secret, chance: np.random.Generator) -> Form | None:
