@@ -37,7 +37,7 @@ class Rest:
     """What the chosen model leaves beyond noise."""
 
     significant: bool
-    """More than its replicates leave, and more than every model is wrong by."""
+    """More than its replicates leave, more than every model is wrong by, and enough to be named."""
     share: float
     """Part of the baseline's error above the noise."""
     worse: float
@@ -47,13 +47,22 @@ class Rest:
     def of(cls, balance: ForceBalance, found: Search) -> Rest:
         """Measure it against the replicates of the chosen model."""
         error, first = float(found.chosen.errors.sum()), float(found.baseline.errors.sum())
-        relative = math.sqrt(error / max(balance.power, 1e-300))
+        relative = relative_error(balance, found.chosen)
         if found.null is None:
             return cls(relative > TOLERANCE, 1.0 if not found.chosen.terms else error / first, 1.0)
         noise = float(np.median(found.null.errors))
-        significant = found.null.p_of_error(error) < LEVEL and relative > TOLERANCE
         share = max(error - noise, 0.0) / max(first - noise, 1e-300)
+        matters = relative > TOLERANCE and (not found.chosen.terms or share > LEAST_GAIN)
+        significant = matters and found.null.p_of_error(error) < LEVEL
         return cls(significant, min(share, 1.0), max(1.0, math.sqrt(error / noise)))
+
+
+def relative_error(balance: ForceBalance, fitted: Fitted) -> float:
+    """Return the force that a fit leaves over that of the drive (rms, N), without the reserved blocks."""
+    rows = ~balance.reserved[balance.block]
+    drive, _ = balance.both_sides(balance.stage)
+    left = as_force(balance, fitted.residual)
+    return float(np.sqrt(np.mean(left[rows] ** 2) / max(float(np.mean(drive[rows] ** 2)), 1e-300)))
 
 
 def answer(
@@ -158,12 +167,14 @@ def _stages(
     if factor is not None:
         stages = {name: with_forces(stage, 1.0 / factor[0]) for name, stage in stages.items()}
         moved = [force_constant(believed, *factor)]
-    return stages, moved + _found(believed, tuned)
+    return stages, moved + _found(balance, believed, tuned)
 
 
-def _found(believed: Stage, tuned: Numbers) -> list[Retuned]:
-    """Return the friction that a belief without any lacks."""
-    if believed.friction is not None:
+def _found(balance: ForceBalance, believed: Stage, tuned: Numbers) -> list[Retuned]:
+    """Return the friction that a belief without any lacks, where there is any to speak of."""
+    drive, _ = balance.both_sides(believed)
+    level = float(tuned.values[3])
+    if believed.friction is not None or level < TOLERANCE * float(np.sqrt(np.mean(drive**2))):
         return []
     keys = (("viscous", "N s/m", 1), ("friction.level", "N", 3), ("friction.reach", "m", 4))
     found = []

@@ -88,7 +88,7 @@ def _others(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -
     known = [
         m
         for m in found.alternatives
-        if sorted(ent.names(m.entries)[:-1]) == kept and m.terms[-1].entry["name"] != name
+        if sorted(ent.names(m.entries)[:-1]) == kept and m.terms[-1].entry["name"] != name and not m.at_bound
     ]
     if known or time.monotonic() > ends:
         return known
@@ -113,4 +113,4 @@ def _fitted(fitter: Fitter, rest: Fitted, terms: Sequence[Term], ends: float) ->
         except (ConfigError, np.linalg.LinAlgError):
             return None
 
-    return [m for m in shared(fit, terms) if m is not None]
+    return [m for m in shared(fit, terms) if m is not None and not m.at_bound]

@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.result import Diagnosis, Place
 from rtcomp.diagnosis.second.answer import answer
@@ -15,9 +17,8 @@ from rtcomp.diagnosis.second.confidence import alternatives
 from rtcomp.diagnosis.second.data import load_data
 from rtcomp.diagnosis.second.fit import Fitted, Fitter
 from rtcomp.diagnosis.second.noise import Noise
-from rtcomp.diagnosis.second.selection import search
+from rtcomp.diagnosis.second.selection import first_gain, search
 from rtcomp.diagnosis.second.settings import BUDGET
-from rtcomp.diagnosis.second.significance import log_gain
 from rtcomp.diagnosis.second.validation import Reserved
 from rtcomp.diagnosis.second.where import Compared, as_force
 from rtcomp.errors import RtcompError
@@ -73,8 +74,13 @@ def diagnose(
 def _objective(
     stage: Stage, recordings: Sequence[Recording], held: bool | None
 ) -> tuple[ForceBalance, Fitted, list[str]]:
-    """Return the force balance and the refitted stage, with the command taken as it fits best."""
-    ways = [True, False] if held is None else [held]
+    """Return the force balance and the refitted stage, with the command taken as it fits best.
+
+    A loop holds its command from row to row. Where there is no reference the command may be a measured signal
+    that goes on between rows: both ways are looked at, each with the best candidate beside it.
+    """
+    looped = all(r.reference is not None for r in recordings)
+    ways = ([True] if looped else [True, False]) if held is None else [held]
     made = []
     for way in ways:
         data = load_data(recordings, held=way)
@@ -83,10 +89,8 @@ def _objective(
         made.append((balance, baseline(balance)))
     if len(made) == 1:
         return (*made[0], [])
-    scaled = [fitted.errors / balance.power for balance, fitted in made]
-    gain = log_gain(scaled[0], scaled[1])
-    chosen = 1 if gain > 0.0 else 0
-    balance, fitted = made[chosen]
-    if chosen == 0:
-        return balance, fitted, []
-    return balance, fitted, ["the command is taken as band-limited between rows, which fits better than held"]
+    scores = [float(np.mean(np.log(f.errors / b.power))) - first_gain(b, f) for b, f in made]
+    if scores[0] <= scores[1]:
+        return (*made[0], [])
+    note = "the command is taken as band-limited between rows, which fits better than held"
+    return (*made[1], [note])

@@ -29,16 +29,17 @@ def free_columns(fitted: Fitted) -> Floats:
     return np.concatenate([fitted.system.columns[free], fitted.tangents])
 
 
-def null_of(balance: ForceBalance, fitted: Fitted, screen: Screen, gain: float, seed: int) -> Null | None:
-    """Return the null distribution beside a fitted model; None where it cannot be simulated.
+def null_of(balance: ForceBalance, fitted: Fitted, screen: Screen, gain: float, seed: int) -> Null:
+    """Return the null distribution beside a fitted model.
 
     Replicates are drawn until it is plain whether `gain` and the error of the fit are beyond them: sequential
-    Monte Carlo (Besag and Clifford 1991, Biometrika 78(2)).
+    Monte Carlo (Besag and Clifford 1991, Biometrika 78(2)). A model that cannot be kept on the recorded
+    motion is judged by surrogates of its residual instead.
     """
     try:
         stage = stage_of(balance, fitted, between=True)
     except ConfigError:
-        return None
+        return _surrogates(balance, fitted, screen, seed)
     motion = [p.x for p in balance.paths()]
 
     def one(number: int) -> tuple[float, float] | None:
@@ -57,11 +58,31 @@ def null_of(balance: ForceBalance, fitted: Fitted, screen: Screen, gain: float, 
     for first, last in ((0, FEW), (FEW, REPLICATES)):
         found += [f for f in shared(one, range(first, last)) if f is not None]
         if len(found) < FEW // 2:
-            return None
+            return _surrogates(balance, fitted, screen, seed)
         null = Null(*np.array(found).T)
         if null.plain(gain, float(fitted.errors.sum())):
             break
     return null
+
+
+def _surrogates(balance: ForceBalance, fitted: Fitted, screen: Screen, seed: int) -> Null:
+    """Return the null distribution of residuals of the same spectrum that know nothing of the motion.
+
+    Phases are drawn anew (Theiler and others 1992, Physica D 58). The error that noise alone leaves is that
+    of the whitened residual: 1 a row.
+    """
+    random = np.random.default_rng(seed)
+    columns = free_columns(fitted)
+    size = np.abs(np.fft.rfft(fitted.residual))
+
+    def one(_: int) -> float:
+        turned = size * np.exp(2j * np.pi * random.random(size.size))
+        gains = screen.gains(columns, np.fft.irfft(turned, fitted.residual.size))
+        return max(s.gain for s in gains)
+
+    rows = float(np.count_nonzero(~balance.reserved[balance.block]))
+    chance = random.normal(1.0, np.sqrt(2.0 / rows), FEW)
+    return Null(np.array([one(k) for k in range(FEW)]), rows * chance)
 
 
 def best(names: Sequence[str], gains: Sequence[float], count: int) -> list[int]:

@@ -106,6 +106,11 @@ def _resettled(
     return sorted(again, key=_score), [*again, *(fitter.fit(g.terms, g) for g in near)]
 
 
+def first_gain(balance: ForceBalance, model: Fitted) -> float:
+    """Return the largest gain of a candidate beside a model, to first order."""
+    return _look(balance, model, None, lambda _part, _what: None).gain
+
+
 @dataclass(frozen=True)
 class _Look:
     """All candidates beside a model, their gains, the null distribution where it was asked for."""
@@ -138,7 +143,7 @@ def _sound(look: _Look, parent: float) -> _Look | None:
     A model that explains recordings of its own no better than the one before explains the real recording has
     shown nothing: it put the drive's force on both sides of the balance.
     """
-    if look.null is None or float(np.median(look.null.errors)) > parent:
+    if look.null is not None and float(np.median(look.null.errors)) > parent:
         return None
     return look
 
