@@ -334,7 +334,7 @@ class ForceBalance:
                 continue
             # What the ends have wrong would be drawn out over all that a filter remembers.
             lead, rows = self._whitening.lead, self._whitening.rows(table.shape[1])
-            white = filtered(table[:, lead:-lead], self.data.rate, self._whitening.response)
+            white = filtered(table[:, lead:-lead], self.data.rate, self._whitening.response, noisy=True)
             parts.append(white[:, rows.start - lead : rows.stop - lead : rows.step])
         return np.concatenate(parts, axis=1)
 
@@ -361,7 +361,7 @@ class ForceBalance:
         parts = []
         for s in signals:
             lead, rows = self.whitening.lead, self.whitening.rows(s.size)
-            below = filtered(s[lead:-lead], self.data.rate, self.noise.wiener)
+            below = filtered(s[lead:-lead], self.data.rate, self.noise.wiener, noisy=True)
             parts.append(below[rows.start - lead : rows.stop - lead : rows.step])
         return np.concatenate(parts)
 

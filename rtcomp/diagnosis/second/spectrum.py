@@ -19,19 +19,25 @@ Response = Callable[[Floats], Floats]
 """Frequency (Hz) to gain; real, so that nothing is delayed."""
 
 
-def filtered(rows: Floats, rate: float, response: Response, *, derivative: bool = False) -> Floats:
+def filtered(
+    rows: Floats, rate: float, response: Response, *, derivative: bool = False, noisy: bool = False
+) -> Floats:
     """Return signals (p, K) or (K,) filtered by `response`, or the derivative (1/s) of what comes out.
 
-    The signals are mirrored at both ends about the points there, which keeps value and slope.
+    The signals are mirrored at both ends about the points there, which keeps value and slope; where the last
+    point is `noisy`, about its time only: twice its noise would be a step.
     """
     table = np.atleast_2d(rows)
     size = table.shape[1]
     pad = max(2, min(int(PAD * size), size - 1))
-    left = 2.0 * table[:, :1] - table[:, pad:0:-1]
-    right = 2.0 * table[:, -1:] - table[:, -2 : -pad - 2 : -1]
+    left, right = table[:, pad:0:-1], table[:, -2 : -pad - 2 : -1]
+    if not noisy:
+        left, right = 2.0 * table[:, :1] - left, 2.0 * table[:, -1:] - right
     long = np.concatenate([left, table, right], axis=1)
     # A straight line has no place in a Fourier series; it is filtered by itself.
-    level, slope = long[:, :1], (long[:, -1:] - long[:, :1]) / (long.shape[1] - 1)
+    ends = max(1, pad // 2) if noisy else 1
+    level, last = long[:, :ends].mean(axis=1)[:, None], long[:, -ends:].mean(axis=1)[:, None]
+    slope = (last - level) / (long.shape[1] - 1)
     line = level + slope * np.arange(long.shape[1])
     count = scipy.fft.next_fast_len(long.shape[1], real=True)
     spectrum = scipy.fft.rfft(long - line, n=count, axis=1)
