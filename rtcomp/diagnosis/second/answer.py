@@ -40,8 +40,6 @@ class Rest:
     """More than its replicates leave, more than every model is wrong by, and enough to be named."""
     share: float
     """Part of the baseline's error above the noise."""
-    worse: float
-    """Error over that of replicates (rms), at least 1: how far the model is from the physics."""
 
     @classmethod
     def of(cls, balance: ForceBalance, found: Search) -> Rest:
@@ -49,12 +47,12 @@ class Rest:
         error, first = float(found.chosen.errors.sum()), float(found.baseline.errors.sum())
         relative = relative_error(balance, found.chosen)
         if found.null is None:
-            return cls(relative > TOLERANCE, 1.0 if not found.chosen.terms else error / first, 1.0)
+            return cls(relative > TOLERANCE, 1.0 if not found.chosen.terms else error / first)
         noise = float(np.median(found.null.errors))
         share = max(error - noise, 0.0) / max(first - noise, 1e-300)
         matters = relative > TOLERANCE and (not found.chosen.terms or share > LEAST_GAIN)
         significant = matters and found.null.p_of_error(error) < LEVEL
-        return cls(significant, min(share, 1.0), max(1.0, math.sqrt(error / noise)))
+        return cls(significant, min(share, 1.0))
 
 
 def relative_error(balance: ForceBalance, fitted: Fitted) -> float:
@@ -76,12 +74,11 @@ def answer(
     """Return the diagnosis that a search ends in."""
     balance, base, chosen = fitter.balance, found.baseline, found.chosen
     rest = Rest.of(balance, found)
-    spans = told(balance, chosen, rest.worse)
-    solid = [not t.nothing and not t.bound for t in spans]
+    spans = told(balance, chosen)
     nearest = rest.significant and rest.share > LEFT
-    notes = _notes(balance, chosen, spans, nearest)
+    notes = _notes(balance, found, nearest)
     shares = _shares(base, chosen, sets)
-    named = [] if nearest or not all(solid) else _named(balance, chosen, spans, sets, shares, rest)
+    named = [] if nearest else _named(balance, chosen, spans, sets, shares, rest)
     final = chosen if named else base
     view = Compared(balance)
     before, after = as_force(balance, base.residual), as_force(balance, final.residual)
@@ -89,7 +86,7 @@ def answer(
         left = locate(view, after, None, seed, believed.axis)
         part = rest.share if named else 1.0
         named.append(Named(UNEXPLAINED, 1.0, {}, part, curve=left_over(left)))
-    tuned = numbers(balance, believed, final, rest.worse)
+    tuned = numbers(balance, believed, final)
     stages, moved = _stages(believed, balance, base, final, tuned, bool(named))
     verdict, matters = _verdict(named, balance, believed, base, moved)
     if not matters:
@@ -204,16 +201,11 @@ def _verdict(
     return ("retuned", True) if matters else ("consistent", False)
 
 
-def _notes(balance: ForceBalance, chosen: Fitted, spans: Sequence[Told], nearest: bool) -> list[str]:
-    notes = [f"frequencies count by signal to noise, up to {balance.noise.bandwidth:.3g} Hz"]
-    names = ent.names(chosen.entries)
+def _notes(balance: ForceBalance, found: Search, nearest: bool) -> list[str]:
+    notes = [f"frequencies count by signal to noise, up to {balance.noise.bandwidth:.3g} Hz", *found.dropped]
+    names = ent.names(found.chosen.entries)
     if nearest and names:
         notes.append(f"nearest, but too much is left: {', '.join(names)}")
-    for name, span in zip(names, spans, strict=True):
-        if span.bound:
-            notes.append(f"{name} is not named: {', '.join(span.bound)} came out at its bound")
-        elif span.nothing:
-            notes.append(f"{name} is not named: its size may be nothing")
     (low, high), unit = prefixed(for_axis("m", balance.stage.axis), *balance.data.stroke)
     if names and not nearest:
         notes.append(f"known from {low} to {high} {unit}, where this motion went, and not beyond")

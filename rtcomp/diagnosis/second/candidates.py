@@ -150,7 +150,7 @@ def _denied(balance: ForceBalance, number: str) -> bool:
 def candidates(balance: ForceBalance, fitted: Fitted, taken: Sequence[str] = ()) -> list[Candidate]:
     """Return every candidate beside a fitted model, with the columns it would add to it."""
     scales = Scales.of(balance, fitted)
-    offset = fitted.coefficients[balance.size - 1] != 0.0
+    offset = fitted.coefficients[balance.size - 1] != 0.0 or any(ent.kind_of(e).bias for e in fitted.entries)
     kinds = [
         k for k in searchable(balance) if k.name not in taken and not (offset and _only_bias(k, balance))
     ]

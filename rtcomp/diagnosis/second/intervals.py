@@ -34,9 +34,14 @@ class Told:
     bound: tuple[str, ...]
     """Parameters that are at a physical bound."""
 
+    @property
+    def solid(self) -> bool:
+        """Tell whether it may be named."""
+        return not self.nothing and not self.bound
 
-def told(balance: ForceBalance, fitted: Fitted, worse: float) -> list[Told]:
-    """Return the 95 % intervals of each term's parameters, widened by `worse`.
+
+def told(balance: ForceBalance, fitted: Fitted) -> list[Told]:
+    """Return the 95 % intervals of each term's parameters.
 
     Blocks of the recording are left out in turn (delete-a-group jackknife: Bell and McCaffrey 2002, Survey
     Methodology 28(2)); what a single block tells is compared with the rest of the recording.
@@ -62,7 +67,7 @@ def told(balance: ForceBalance, fitted: Fitted, worse: float) -> list[Told]:
                     apart = (apart + np.pi) % (2.0 * np.pi) - np.pi
                 sd = float(np.sqrt(max(scatter(apart[:, None])[0, 0], 0.0)))
                 size = 2.0 if p.unit == ent.PHASE else abs(value)
-                half = worse * math.hypot(factor * max(sd, once.get(p.name, 0.0)), MODEL * size)
+                half = math.hypot(factor * max(sd, once.get(p.name, 0.0)), MODEL * size)
                 if _at_bound(value, p.lowest, p.high):
                     bound.append(p.name)
             elif p.name == ent.MOMENT:
@@ -118,7 +123,7 @@ def _once(balance: ForceBalance, fitted: Fitted, at: int, span: slice) -> dict[s
     return found
 
 
-def numbers(balance: ForceBalance, believed: Stage, fitted: Fitted, worse: float) -> Numbers:
+def numbers(balance: ForceBalance, believed: Stage, fitted: Fitted) -> Numbers:
     """Return mass, damping, level and reach of friction, believed and found, with their half widths."""
     from scipy.stats import t as student
 
@@ -132,7 +137,7 @@ def numbers(balance: ForceBalance, believed: Stage, fitted: Fitted, worse: float
     sets = np.array([of(c) for c in fitted.without])
     spread = np.maximum(np.diag(scatter(sets)), 0.0)
     factor = float(student.ppf(0.975, max(sets.shape[0] - 1, 1)))
-    half = worse * np.sqrt(factor**2 * spread + (MODEL * values) ** 2)
+    half = np.sqrt(factor**2 * spread + (MODEL * values) ** 2)
     m = believed.mechanics
     before = np.array([m.mass, m.viscous, m.micro_damping, *_friction(believed)])
     return Numbers(before, values, half, np.zeros(values.size))

@@ -14,6 +14,7 @@ from rtcomp.diagnosis.second.balance import ForceBalance
 from rtcomp.diagnosis.second.baseline import settle
 from rtcomp.diagnosis.second.candidates import Candidate, candidates, started
 from rtcomp.diagnosis.second.fit import Fitted, Fitter, Term
+from rtcomp.diagnosis.second.intervals import told
 from rtcomp.diagnosis.second.replicates import best, free_columns, null_of
 from rtcomp.diagnosis.second.screening import Screen, Screened
 from rtcomp.diagnosis.second.settings import BEAM, FULL_FITS, LEAST_GAIN, LEVEL, MOST_EFFECTS
@@ -42,6 +43,8 @@ class Search:
     screened: list[tuple[str, float, float]] = field(default_factory=list)
     """Name, gain and p-value of each candidate beside the baseline."""
     not_tried: list[str] = field(default_factory=list)
+    dropped: list[str] = field(default_factory=list)
+    """What was found and not kept, and why."""
 
 
 def search(fitter: Fitter, baseline: Fitted, ends: float, say: Say, seed: int = 0) -> Search:
@@ -87,7 +90,22 @@ def search(fitter: Fitter, baseline: Fitted, ends: float, say: Say, seed: int = 
             break
         beam, grown = _resettled(fitter, found, beam, grown, parents)
         everything = float(found.baseline.errors.sum())
+    _solid(fitter, found)
     return found
+
+
+def _solid(fitter: Fitter, found: Search) -> None:
+    """Leave out effects whose size may be nothing or is at a bound, and refit the others."""
+    while found.chosen.terms:
+        spans = told(fitter.balance, found.chosen)
+        weak = [i for i, span in enumerate(spans) if not span.solid]
+        if not weak:
+            return
+        name, span = ent.names(found.chosen.entries)[weak[-1]], spans[weak[-1]]
+        why = f"{', '.join(span.bound)} at its bound" if span.bound else "its size may be nothing"
+        found.dropped.append(f"{name} is not named: {why}")
+        kept = [t for i, t in enumerate(found.chosen.terms) if i != weak[-1]]
+        found.chosen, found.alternatives = fitter.fit(kept, found.chosen), []
 
 
 def _resettled(
