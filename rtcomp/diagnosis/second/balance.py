@@ -40,6 +40,8 @@ FEWEST, MOST = 10, 25
 """Blocks of a recording: at least, at most."""
 BASE = ("mass", "viscous", "micro_damping")
 """Columns before those of the friction units."""
+MORE = 1e-3
+"""Relative change of the command to which that of friction is looked at."""
 KEPT = 3 * 10**8
 """Bytes of columns that are kept for the next evaluation."""
 
@@ -236,7 +238,7 @@ class ForceBalance:
 
         Raises ConfigError where a parameter is out of its bounds.
         """
-        drive, base, added, scaled = self._groups(entries, weights)
+        drive, base, added, by_load = self._groups(entries, weights)
         y = self._whitened(drive)[0]
         rows, spans = [self._whitened(g) for g in base], []
         at = sum(r.shape[0] for r in rows)
@@ -246,12 +248,12 @@ class ForceBalance:
             spans.append(slice(at, at + len(found)))
             at += len(found)
         columns = np.concatenate(rows)
-        scale = self._scale(y) if scaled else 1.0
-        return System(scale * y, scale * columns if scaled else columns, tuple(spans))
+        scale = self._scale(y, by_load)
+        return System(scale * y, scale * columns if scale != 1.0 else columns, tuple(spans))
 
     def error(self, entries: Sequence[Entry], c: Floats, weights: Floats | None = None) -> Floats:
         """Return ``y - A c`` (n,) of `system` for given coefficients, filtered as one signal: far cheaper."""
-        drive, base, added, scaled = self._groups(entries, weights)
+        drive, base, added, by_load = self._groups(entries, weights)
         y = self._whitened(drive)[0]
         out = y.copy()
         pending: list[Floats] | None = None
@@ -270,26 +272,30 @@ class ForceBalance:
             pending = signals if pending is None else [p + q for p, q in zip(pending, signals, strict=True)]
         if pending is not None:
             out -= self._filtered(pending)[0]
-        return np.asarray(self._scale(y) * out) if scaled else out
+        return np.asarray(self._scale(y, by_load) * out)
 
     def forces_of(self, entries: Sequence[Entry]) -> Floats:
         """Return the columns (p, n) of the last of `entries`, which adds a force; they are not kept."""
-        drive, _, added, scaled = self._groups(entries, None)
+        drive, _, added, by_load = self._groups(entries, None)
         rows = np.concatenate([self._filtered(g.make()) for g in added[-1]])
-        return self._scale(self._whitened(drive)[0]) * rows if scaled else rows
+        return np.asarray(self._scale(self._whitened(drive)[0], by_load) * rows)
 
-    def _scale(self, y: Floats) -> float:
-        """Return what makes up for a drive side that is smaller than the belief's.
+    def _scale(self, y: Floats, by_load: _Group | None) -> float:
+        """Return what makes up for a residual that depends less on the command than that of the belief.
 
-        Noise of the motion counts as force in proportion to the force constant: what shrinks both sides has
-        explained nothing.
+        The density of a command is that of its residual times their derivative: a model whose drive side is
+        smaller, or whose friction takes up whatever the drive gives (`by_load`), has explained nothing by it.
         """
-        return float(np.sqrt(max(self._power(self._plain_drive()) / max(self._power(y), 1e-300), 1.0)))
+        told = y if by_load is None else y - self._whitened(by_load)[0]
+        plain = self._plain_drive()
+        if told is plain or self._whitening is None:
+            return 1.0
+        return float(np.sqrt(max(self._swing(plain) / max(self._swing(told), 1e-300), 1.0)))
 
     def _groups(
         self, entries: Sequence[Entry], weights: Floats | None
-    ) -> tuple[_Group, list[_Group], list[list[_Group]], bool]:
-        """Return the drive side, the columns of base and of each entry, whether the sides are scaled."""
+    ) -> tuple[_Group, list[_Group], list[list[_Group]], _Group | None]:
+        """Return the drive side, the columns of base and of each entry, the friction that loads make."""
         everything = [*self.believed, *entries]
         adding = [ent.adds_force(ent.kind_of(e)) for e in everything]
         work = [*self._fixed, *(ent.build(e) for e, adds in zip(everything, adding, strict=True) if not adds)]
@@ -300,22 +306,26 @@ class ForceBalance:
         bodies = [e for e in work if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
         forces_added = [ent.build(e) for e, adds in zip(everything, adding, strict=True) if adds]
         side = _Group(("y", _key(drive), _key(sensors)), lambda: self._drive_side(drive, sensors))
-        base = self._base(drive, sensors, modifiers, bodies, forces_added, weights)
+        base, by_load = self._base(drive, sensors, modifiers, bodies, forces_added, weights)
         added = [
             [self._added(made, sensors) for made in ent.basis(e)] if adds else []
             for e, adds in zip(everything, adding, strict=True)
         ]
-        return side, base, added, self._whitening is not None and bool(drive or sensors)
+        return side, base, added, by_load
 
     def _plain_drive(self) -> Floats:
         fixed = [e for e in self._fixed if e.place is Place.DRIVE]
         sensors = [e for e in self._fixed if e.place is Place.SENSOR]
         key = ("y", _key(fixed), _key(sensors))
-        side = self._whitened(_Group(key, lambda: self._drive_side(fixed, sensors)))
-        return np.asarray(side[0])
+        found: Floats = self._whitened(_Group(key, lambda: self._drive_side(fixed, sensors)))[0]
+        return found
 
     def _power(self, y: Floats) -> float:
         return float(np.sum(y[~self.reserved[self.block]] ** 2))
+
+    def _swing(self, y: Floats) -> float:
+        """Return the power of what a constant does not change."""
+        return float(np.var(y[~self.reserved[self.block]]))
 
     # -- rows, whitened and joined over the segments ------------------------------------------------------
 
@@ -415,8 +425,11 @@ class ForceBalance:
         bodies: Sequence[Effect],
         adding: Sequence[Effect],
         weights: Floats | None,
-    ) -> list[_Group]:
-        """Return the base's columns: mass; damping and friction units; a constant force."""
+    ) -> tuple[list[_Group], _Group | None]:
+        """Return the base's columns (mass; damping and friction units; a constant force), and the load's.
+
+        The latter is how much the friction at hand changes with the command, relative to it.
+        """
         whole = any(e.whole_friction for e in modifiers)
         play = next((e for e in bodies if e.behind and _active(e)), None)
         hung = [e for e in bodies if not e.behind]
@@ -444,7 +457,7 @@ class ForceBalance:
                 found.append(a)
             return found
 
-        def units() -> list[Floats]:
+        def units(more: float = 0.0) -> list[Floats]:
             found = []
             for k, (s, p) in enumerate(zip(self.data.segments, self.paths(sensors), strict=True)):
                 path = p
@@ -452,14 +465,24 @@ class ForceBalance:
                     y = self._load(sensors, play, weights)[k]
                     v = np.gradient(y, self.data.period)
                     path = Path(y, v, _second_difference(y, self.data.rate), p.measured)
-                found.append(self._units(s, path, before, modifiers, weights if whole else None))
+                pushed = replace(s, voltage=(1.0 + more) * s.voltage) if more else s
+                found.append(self._units(pushed, path, before, modifiers, weights if whole else None))
             return found
 
-        return [
+        def by_load() -> list[Floats]:
+            held = self.weights if weights is None else weights
+            first = len(BASE) - 1
+            pairs = zip(units(MORE), units(), strict=True)
+            return [(more[:, first:] - plain[:, first:]) @ held / MORE for more, plain in pairs]
+
+        key = (_key(before), _key(modifiers), _key(sensors), behind, own)
+        columns = [
             _Group(("mass", _key(hung), _key(sensors), behind), mass),
-            _Group(("units", _key(before), _key(modifiers), _key(sensors), behind, own), units),
+            _Group(("units", *key), units),
             _Group(("offset",), lambda: [np.ones(s.time.size) for s in self.data.segments]),
         ]
+        held = (weights if weights is not None else self.weights).tobytes()
+        return columns, _Group(("by load", held, *key), by_load) if before else None
 
     def _load(self, sensors: Sequence[Effect], play: Effect, weights: Floats | None) -> list[Floats]:
         """Return the position (m) of the load behind a play along each segment."""

@@ -52,6 +52,11 @@ class Candidate:
         """Its name."""
         return str(self.term.entry["name"])
 
+    @property
+    def family(self) -> str:
+        """Its name and form."""
+        return f"{self.name} {self.term.entry.get('form', '')}"
+
 
 @dataclass(frozen=True)
 class Scales:
@@ -63,6 +68,7 @@ class Scales:
     volts: Floats
     time: tuple[float, float]
     frequency: tuple[float, float]
+    force: float
     periods: Floats
     tones: Floats
     moments: Floats
@@ -86,6 +92,7 @@ class Scales:
             np.unique(np.quantile(u[u > 0], quantiles)) if np.any(u > 0) else np.ones(1),
             (data.period, 0.5 * data.seconds),
             (4.0 / data.seconds, 0.4 * data.rate),
+            float(np.sqrt(np.mean(as_force(balance, rest) ** 2))),
             _periods(balance, rest),
             _tones(balance, rest),
             _moments(balance, rest),
@@ -121,6 +128,7 @@ class Scales:
             "m": np.geomspace(*self.length, POINTS + 1),
             "m/s": self.speed,
             "V": self.volts,
+            "N": self.force * np.array([0.3, 1.0, 3.0]),
             "s": np.geomspace(*self.time, POINTS + 1)[:-1],
             "Hz": np.geomspace(*self.frequency, 2 * POINTS),
         }.get(unit)

@@ -31,7 +31,8 @@ class Alternatives:
 
     term: Term
     names: tuple[str, ...]
-    """All that cannot be told apart, likeliest first."""
+    """All that cannot be told apart and is as plain, likeliest first: what has more parameters and gains
+    nothing by them is no other explanation."""
     probability: float
     """That the truth is among them, if it is among all that was fitted."""
     gain: float
@@ -54,7 +55,8 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         members |= {
             k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= (1.0 - ALIAS) * best_gain
         }
-        members.add(0)
+        plainest = min(models[k].size for k in members)
+        members = {k for k in members if models[k].size == plainest} | {0}
         rows = float(np.mean(np.bincount(fitter.balance.block)))
         weight = probabilities(errors, rows)
         order = sorted(members, key=lambda k: (-weight[k], k))
@@ -99,7 +101,7 @@ def _others(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -
     )
     least = NEAR * log_gain(rest.errors, chosen.errors)
     tried = [
-        k for k in best([c.name for c in made], [s.gain for s in screened], 3) if screened[k].gain > least
+        k for k in best([c.family for c in made], [s.gain for s in screened], 3) if screened[k].gain > least
     ]
     return _fitted(fitter, rest, [started(made[k], screened[k].sizes) for k in tried], ends)
 

@@ -36,7 +36,7 @@ def build(entry: Mapping[str, Any]) -> Effect:
 
 
 def adds_force(kind: type[Effect]) -> bool:
-    """Tell whether an effect does no more than add a force that the other forces do not change."""
+    """Tell whether an effect only adds a force of free size, which the other forces do not change."""
     return bool(_adds_force(cast(Hashable, kind)))
 
 
@@ -48,7 +48,7 @@ def waves(kind: type[Effect], entry: Mapping[str, Any]) -> bool:
 
 @cache
 def _adds_force(kind: Any) -> bool:
-    if kind.place is Place.SENSOR:
+    if kind.place is Place.SENSOR or not kind.linear:
         return False
     for form in kind.forms or ("",):
         effect = kind.from_dict({**kind.example, **({"form": form} if form else {})})

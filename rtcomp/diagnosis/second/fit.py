@@ -106,6 +106,11 @@ class Fitted:
     """N/m of the friction units."""
 
     @property
+    def size(self) -> int:
+        """Number of parameters of its effects."""
+        return sum(len(t.free) for t in self.terms)
+
+    @property
     def at_bound(self) -> bool:
         """Tell whether a nonlinear parameter of the last term came out at its bound."""
         last = len(self.terms) - 1

@@ -24,6 +24,8 @@ from rtcomp.errors import ConfigError
 SCANNED = 14
 """Values of a length that are tried where first order is no guide."""
 
+PLAINER = 1e-3
+"""Logarithm of the error that one parameter more must gain to count at all."""
 NEAR = 1.0
 """Logarithm of the error over the best one's, up to which a model is kept as an alternative."""
 
@@ -170,7 +172,7 @@ def _grow(
     fitter: Fitter, model: Fitted, made: Sequence[Candidate], screened: Sequence[Screened], ends: float
 ) -> list[Fitted]:
     """Return the model with each of the best candidates, fitted in full."""
-    chosen = best([c.name for c in made], [s.gain for s in screened], FULL_FITS)
+    chosen = best([c.family for c in made], [s.gain for s in screened], FULL_FITS)
     terms = [started(made[i], screened[i].sizes) for i in chosen]
     # First order is no guide to what is behind a play: its own motion is followed from place to place.
     behind = {c.name: c.term for c in made if ent.kind_of(c.term.entry).behind}
@@ -241,7 +243,8 @@ def _pruned(fitter: Fitter, model: Fitted, null: Null | None, everything: float)
 
 
 def _score(model: Fitted) -> float:
-    return float(np.mean(np.log(model.errors)))
+    """Return the logarithm of the error left out; of models that are alike, the plainer comes first."""
+    return float(np.mean(np.log(model.errors))) + PLAINER * model.size
 
 
 def _distinct(models: Sequence[Fitted]) -> list[Fitted]:

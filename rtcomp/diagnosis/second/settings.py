@@ -13,7 +13,7 @@ REPLICATES = 19
 BEAM = 3
 """Models kept at each step of the search: more find effects that hide each other, and cost time."""
 
-FULL_FITS = 6
+FULL_FITS = 8
 """Candidates refitted in full at each step, best of the screening first."""
 
 MOST_EFFECTS = 4
@@ -29,7 +29,7 @@ RESERVED_EVERY = 5
 BELIEF_SD = 0.2
 """Prior standard deviation of a believed number, relative to it."""
 
-ALIAS = 0.01
+ALIAS = 0.03
 """Part of the best candidate's gain that another may lack and still not be told apart from it."""
 
 LEFT = 0.2
