@@ -47,6 +47,21 @@ def diagnose(
     `progress` hears how far each step is, `located` the places of the mismatch before anything is named.
     Raises RtcompError where the budget does not do for the baseline.
     """
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1, user_api="blas"):  # the cores are shared out by `cores`
+        return _diagnosed(stage, recordings, held, budget, progress, located, seed)
+
+
+def _diagnosed(
+    stage: Stage,
+    recordings: Sequence[Recording],
+    held: bool | None,
+    budget: float,
+    progress: Progress | None,
+    located: Located | None,
+    seed: int,
+) -> Diagnosis:
     say: Progress = progress or (lambda _part, _what: None)
     ends = time.monotonic() + budget
     say(0.0, "balance")
