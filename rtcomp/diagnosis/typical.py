@@ -85,6 +85,8 @@ def typical(s: Scene, moment: float) -> list[Typical]:
         ({"name": "parallel-spring", "stiffness": 3 * small / s.span}, "stiffness", 1.0),
         ({"name": "gravity", "force": small}, "force", 1.0),
         ({"name": "constant-force", "force": small}, "force", 1.0),
+        ({"name": "bouc-wen", "alpha": 3 * small / s.span, "beta": 6.0 / s.span, "gamma": 0.5, "delta": 0.0},
+         "alpha", 1.0),
         ({"name": "end-stop", "position": top - 0.1 * s.span, "stiffness": 50 * small / s.span}, "stiffness",
          10.0),
         ({"name": "tonal-disturbance", "amplitude": 1.4 * small, "frequency": 0.3 * cut}, "amplitude", 1.0),
