@@ -24,7 +24,7 @@ from rtcomp.diagnosis.second.selection import Search
 from rtcomp.diagnosis.second.settings import LEAST_GAIN, LEFT, LEVEL, TOLERANCE
 from rtcomp.diagnosis.second.stage_of import stage_of
 from rtcomp.diagnosis.second.validation import Reserved
-from rtcomp.diagnosis.second.where import Compared, as_force, curves
+from rtcomp.diagnosis.second.where import Compared, as_force, curves, relative_error
 from rtcomp.errors import ConfigError, RtcompError
 from rtcomp.stage.stage import Stage
 from rtcomp.units import for_axis, prefixed
@@ -53,14 +53,6 @@ class Rest:
         matters = relative > TOLERANCE and (not found.chosen.terms or share > LEAST_GAIN)
         significant = matters and found.null.p_of_error(error) < LEVEL
         return cls(significant, min(share, 1.0))
-
-
-def relative_error(balance: ForceBalance, fitted: Fitted) -> float:
-    """Return the force that a fit leaves over that of the drive (rms, N), without the reserved blocks."""
-    rows = ~balance.reserved[balance.block]
-    drive, _ = balance.both_sides(balance.stage)
-    left = as_force(balance, fitted.residual)
-    return float(np.sqrt(np.mean(left[rows] ** 2) / max(float(np.mean(drive[rows] ** 2)), 1e-300)))
 
 
 def answer(
@@ -169,7 +161,7 @@ def _stages(
 
 def _found(balance: ForceBalance, believed: Stage, tuned: Numbers) -> list[Retuned]:
     """Return the friction that a belief without any lacks, where there is any to speak of."""
-    drive, _ = balance.both_sides(believed)
+    drive = balance.drive_force()
     level = float(tuned.values[3])
     if believed.friction is not None or level < TOLERANCE * float(np.sqrt(np.mean(drive**2))):
         return []

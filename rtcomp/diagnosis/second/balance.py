@@ -366,6 +366,11 @@ class ForceBalance:
             needed.append(f.mass * p.measured - f.others())
         return self.smooth(given), self.smooth(needed)
 
+    def drive_force(self) -> Floats:
+        """Return the force of the believed drive (N, (n,)) below the motion's bandwidth."""
+        found: Floats = self._cache.of(("drive",), lambda: [self.both_sides(self.stage)[0]])[0]
+        return found
+
     def smooth(self, signals: Sequence[Floats]) -> Floats:
         """Return signals (K,), one a segment, below the motion's bandwidth on the compared rows, (n,)."""
         parts = []

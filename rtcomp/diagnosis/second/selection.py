@@ -17,8 +17,9 @@ from rtcomp.diagnosis.second.fit import Fitted, Fitter, Term
 from rtcomp.diagnosis.second.intervals import told
 from rtcomp.diagnosis.second.replicates import best, free_columns, null_of
 from rtcomp.diagnosis.second.screening import Screen, Screened
-from rtcomp.diagnosis.second.settings import BEAM, FULL_FITS, LEAST_GAIN, LEVEL, MOST_EFFECTS
+from rtcomp.diagnosis.second.settings import BEAM, FULL_FITS, LEAST_GAIN, LEVEL, MOST_EFFECTS, NEGLIGIBLE
 from rtcomp.diagnosis.second.significance import Null, log_gain
+from rtcomp.diagnosis.second.where import relative_error
 from rtcomp.errors import ConfigError
 
 SCANNED = 14
@@ -79,7 +80,7 @@ def search(fitter: Fitter, baseline: Fitted, ends: float, say: Say, seed: int = 
         if time.monotonic() > ends:
             others = " and ".join(ent.names(found.chosen.entries))
             found.not_tried.append(f"all further effects beside {others or 'the belief'}")
-        accepted = [g for g in grown if _accepted(g, _parent(g, beam), null, everything)]
+        accepted = [g for g in grown if _accepted(fitter.balance, g, _parent(g, beam), null, everything)]
         accepted = _distinct(sorted(accepted, key=_score))[:BEAM]
         parents = {}
         next_beam = []
@@ -215,13 +216,17 @@ def _scanned(fitter: Fitter, model: Fitted, term: Term, ends: float) -> Term | N
     return term.with_entry({**term.entry, name: value})
 
 
-def _accepted(model: Fitted, parent: Fitted, null: Null | None, everything: float) -> bool:
+def _accepted(
+    balance: ForceBalance, model: Fitted, parent: Fitted, null: Null | None, everything: float
+) -> bool:
     """Tell whether the last effect of a model passes the one test and matters."""
     if null is None or model.at_bound:
         return False
     p = null.p_value(log_gain(parent.errors, model.errors))
     gained = float(parent.errors.sum() - model.errors.sum())
-    return p < LEVEL and gained > LEAST_GAIN * everything
+    if p >= LEVEL or gained <= LEAST_GAIN * everything:
+        return False
+    return relative_error(balance, parent) ** 2 - relative_error(balance, model) ** 2 > NEGLIGIBLE**2
 
 
 def _parent(model: Fitted, beam: Sequence[Fitted]) -> Fitted:
@@ -235,7 +240,7 @@ def _pruned(fitter: Fitter, model: Fitted, null: Null | None, everything: float)
         smaller = [
             fitter.fit([*model.terms[:i], *model.terms[i + 1 :]], model) for i in range(len(model.terms))
         ]
-        rest = [s for s in smaller if not _accepted(model, s, null, everything)]
+        rest = [s for s in smaller if not _accepted(fitter.balance, model, s, null, everything)]
         if not rest:
             return model
         model = min(rest, key=_score)

@@ -77,6 +77,14 @@ def as_force(balance: ForceBalance, residual: Floats) -> Floats:
     return np.concatenate(out)
 
 
+def relative_error(balance: ForceBalance, fitted: Fitted) -> float:
+    """Return the force that a fit leaves over that of the drive (rms, N), without the reserved blocks."""
+    rows = ~balance.reserved[balance.block]
+    left = as_force(balance, fitted.residual)
+    power = float(np.mean(balance.drive_force()[rows] ** 2))
+    return float(np.sqrt(np.mean(left[rows] ** 2) / max(power, 1e-300)))
+
+
 def curves(balance: ForceBalance, fitted: Fitted) -> list[Curve | None]:
     """Return the curve of each effect of a fit, beside the others: its force along what it follows most."""
     looked = axes_of(Compared(balance), balance.stage.axis)
