@@ -24,7 +24,7 @@ from rtcomp.diagnosis.second.selection import Search
 from rtcomp.diagnosis.second.settings import LEAST_GAIN, LEFT, LEVEL, TOLERANCE
 from rtcomp.diagnosis.second.stage_of import stage_of
 from rtcomp.diagnosis.second.validation import Reserved
-from rtcomp.diagnosis.second.where import Compared, as_force, curves, relative_error
+from rtcomp.diagnosis.second.where import Compared, above_noise, as_force, curves
 from rtcomp.errors import ConfigError, RtcompError
 from rtcomp.stage.stage import Stage
 from rtcomp.units import for_axis, prefixed
@@ -37,7 +37,7 @@ class Rest:
     """What the chosen model leaves beyond noise."""
 
     significant: bool
-    """More than its replicates leave, more than every model is wrong by, and enough to be named."""
+    """More than its replicates leave, above the noise more than models are wrong by, and enough to be named."""
     share: float
     """Part of the baseline's error above the noise."""
 
@@ -45,7 +45,7 @@ class Rest:
     def of(cls, balance: ForceBalance, found: Search) -> Rest:
         """Measure it against the replicates of the chosen model."""
         error, first = float(found.chosen.errors.sum()), float(found.baseline.errors.sum())
-        relative = relative_error(balance, found.chosen)
+        relative = above_noise(balance, found.chosen)
         if found.null is None:
             return cls(relative > TOLERANCE, 1.0 if not found.chosen.terms else error / first)
         noise = float(np.median(found.null.errors))

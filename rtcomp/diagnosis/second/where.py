@@ -85,6 +85,13 @@ def relative_error(balance: ForceBalance, fitted: Fitted) -> float:
     return float(np.sqrt(np.mean(left[rows] ** 2) / max(power, 1e-300)))
 
 
+def above_noise(balance: ForceBalance, fitted: Fitted) -> float:
+    """Return the relative force error (rms) that the sensor's noise does not account for."""
+    power = float(np.mean(balance.drive_force() ** 2))
+    noise = balance.noise_power / max(power, 1e-300)
+    return float(np.sqrt(max(relative_error(balance, fitted) ** 2 - noise, 0.0)))
+
+
 def curves(balance: ForceBalance, fitted: Fitted) -> list[Curve | None]:
     """Return the curve of each effect of a fit, beside the others: its force along what it follows most."""
     looked = axes_of(Compared(balance), balance.stage.axis)
