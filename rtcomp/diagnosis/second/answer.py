@@ -37,7 +37,7 @@ class Rest:
     """What the chosen model leaves beyond noise."""
 
     significant: bool
-    """More than its replicates leave, above the noise more than models are wrong by, and enough to be named."""
+    """More than its replicates leave, above the noise more than models are off, and enough to be named."""
     share: float
     """Part of the baseline's error above the noise."""
 
