@@ -189,7 +189,7 @@ def _verdict(
     relative = math.sqrt(as_believed / max(float(np.mean(drive[rows] ** 2)), 1e-300))
     matters = bool(moved) and better and relative > TOLERANCE
     if named:
-        # Numbers bent to an unknown cause may do worse on other motion; friction that nobody believed does not.
+        # Numbers bent to an unknown cause may do worse on other motion; friction where none was, not.
         return "unexplained", matters and believed.friction is None
     return ("retuned", True) if matters else ("consistent", False)
 
