@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtcomp.diagnosis.certain import Numbers, elsewhere, scatter
+from rtcomp.diagnosis.certain import MODEL, Numbers, elsewhere, scatter
 from rtcomp.diagnosis.extend import level_and_reach
 from rtcomp.diagnosis.result import Value
 from rtcomp.diagnosis.second import entries as ent
@@ -18,8 +18,6 @@ from rtcomp.kernels import Floats
 from rtcomp.stage.stage import Stage
 from rtcomp.units import for_axis
 
-MODEL = 2e-3
-"""Relative error of a number that equations of motion in rows of the recording leave in any case."""
 AT_BOUND = 1e-3
 """Part of its range within which a number is at its bound."""
 
