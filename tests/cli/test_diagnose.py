@@ -49,10 +49,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
-def diagnosed(folder: Path) -> dict[str, Any]:
-    run = rtcomp("diagnose", "cogging.h5", "--stage", "stage.yaml", "--out", "out", "--json", at=folder,
-                 timeout=600)  # fmt: skip
+@pytest.fixture(scope="module", params=["first", "second"])
+def diagnosed(folder: Path, request: pytest.FixtureRequest) -> dict[str, Any]:
+    run = rtcomp("diagnose", "cogging.h5", "--stage", "stage.yaml", "--out", "out", "--force", "--json",
+                 "--method", request.param, at=folder, timeout=600)  # fmt: skip
     assert (run.returncode, run.stderr) == (0, "")
     answer: dict[str, Any] = json.loads(run.stdout)
     return answer
@@ -72,6 +72,22 @@ def test_the_answer_is_the_contracts_and_the_same_in_the_folder(
         for value in effect["parameters"].values():
             assert value["low"] <= value["value"] <= value["high"] and value["unit"]
     assert ("next_experiment" in written) == (folder / "out" / "reference.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "says"),
+    [
+        ("--budget", "0.001", ["budget of 0.001 s", "give it more"]),
+        ("--budget", "0", ["0", "x>0"]),
+        ("--input", "stepped", ["stepped", "held", "band-limited"]),
+        ("--method", "third", ["third", "first", "second"]),
+    ],
+)
+def test_bad_options_of_the_second_method(folder: Path, option: str, value: str, says: list[str]) -> None:
+    method = [] if option == "--method" else ["--method", "second"]
+    given = ("--stage", "stage.yaml", "--out", "new", *method, option, value)
+    refused("diagnose", "stage.h5", *given, at=folder, says=says)
+    assert not (folder / "new").exists()
 
 
 def test_the_concealed_effect_is_named_and_explains_the_recording(diagnosed: dict[str, Any]) -> None:
