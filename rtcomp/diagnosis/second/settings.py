@@ -7,9 +7,9 @@ LEAST_GAIN = 0.05
 """Least part of the initial squared error that an effect must remove. Below it an effect may be real, but
 does not matter: a kernel is right to a tenth of its force, and a further effect must stand above that."""
 
-NEGLIGIBLE = 1e-3
-"""Least force that an effect must explain, over that of the drive, both rms: every model is wrong in the
-fourth digit, however well a sensor sees it."""
+NEGLIGIBLE = 3e-3
+"""Least force that an effect must explain, over that of the drive, both rms: equations of motion in rows of a
+recording are wrong in the third digit, however well a sensor sees it."""
 
 REPLICATES = 19
 """Bootstrap replicates behind the null distribution: more make its tail surer and the answer later."""
