@@ -55,7 +55,7 @@ def test_rests_that_begin_with_readings_half_a_count_off_are_no_ageing(tmp_path:
     """Friction gives way over 78 counts. Ageing takes four tenths of the error off, and may be none."""
     case = draw(Plan("case", "clean", (), "full", 1292388983252871617))
     dump_yaml(tmp_path / "stage.yaml", case.believed)
-    write_recording(tmp_path / "train.csv.gz", case.run("train"), case.loop.resolution)
+    write_recording(tmp_path / "train.csv.gz", case.run("train"), case.loop)
     done = diagnose(Stage.load(tmp_path / "stage.yaml"), [read(tmp_path / "train.csv.gz")])
     assert done.verdict == "consistent"
     assert not done.effects
