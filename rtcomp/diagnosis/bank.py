@@ -48,11 +48,13 @@ def units_along(
     weights: Floats,
     motion: Floats,
     grain: float,
+    start: Floats | None = None,
 ) -> Floats:
     """Return the force (N) of each unit around the rows of a motion, (K, 2 + reaches).
 
     `motion` is (K, 5): time (s), position (m), velocity, acceleration, the command held up to each row (V);
-    `weights` (N/m) of the stop elements make the friction at hand. `drive` effects only tell the load.
+    `weights` (N/m) of the stop elements make the friction at hand; `start` (m) are their deflections before
+    the motion, nothing where it is not given. `drive` effects only tell the load.
     """
     units: list[Effect] = [
         ViscousFriction(coefficient=1.0),
@@ -74,11 +76,23 @@ def units_along(
     w = np.zeros(COUNT)
     w[GRAIN] = grain
     base = np.array([stage.mass, stage.force_constant])
+    deflection = np.zeros(len(reaches)) if start is None else start.copy()
     _along(
         program.steps, program.p, program.s, w, base, motion, parts, len(before), len(bent), weights, reaches,
-        out, mean,
+        deflection, out, mean,
     )  # fmt: skip
     return around_rows(out) if parts == 1 else mean
+
+
+@compiled
+def deflections(position: Floats, reaches: Floats) -> Floats:
+    """Return the deflections (m, (N,)) of stop elements after a motion (m, (K,)), from nothing."""
+    found = np.zeros(reaches.size)
+    for k in range(1, position.size):
+        moved = position[k] - position[k - 1]
+        for i in range(reaches.size):
+            found[i] = stretched(found[i], moved, reaches[i])
+    return found
 
 
 @compiled
@@ -94,6 +108,7 @@ def _along(
     bent: int,
     weights: Floats,
     reaches: Floats,
+    deflection: Floats,
     out: Floats,
     mean: Floats,
 ) -> None:
@@ -106,7 +121,6 @@ def _along(
     """
     count = weights.size
     then = first + SPEED_UNITS
-    deflection = np.zeros(count)
     level = stiffness = 0.0
     for i in range(count):
         level += weights[i] * reaches[i]

@@ -147,11 +147,14 @@ class ForceBalance(Signals):
                 out -= c[at : at + kept[0].shape[0]] @ kept[0]
                 at += kept[0].shape[0]
                 continue
-            made = group.make()
-            width = 1 if made[0].ndim == 1 else made[0].shape[1]
-            sizes = c[at : at + width]
-            at += width
-            signals = [m * sizes[0] if m.ndim == 1 else m @ sizes for m in made]
+            if group.times is not None:
+                sizes = c[at : at + group.width]
+                signals = group.times(sizes)
+            else:
+                made = group.make()
+                sizes = c[at : at + (1 if made[0].ndim == 1 else made[0].shape[1])]
+                signals = [m * sizes[0] if m.ndim == 1 else m @ sizes for m in made]
+            at += sizes.size
             pending = signals if pending is None else [p + q for p, q in zip(pending, signals, strict=True)]
         if pending is not None:
             out -= self._filtered(pending)[0]

@@ -56,3 +56,7 @@ class Group:
 
     key: Hashable
     make: Callable[[], list[Floats]]
+    times: Callable[[Floats], list[Floats]] | None = None
+    """The sum of all columns times so many sizes, (K,) for each segment, where that is less work."""
+    width: int = 0
+    """Columns, where `times` is given."""

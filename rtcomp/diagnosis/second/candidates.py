@@ -67,12 +67,19 @@ def _denied(balance: ForceBalance, number: str) -> bool:
     return number in BASE and balance.without(number)
 
 
-def candidates(balance: ForceBalance, fitted: Fitted, taken: Sequence[str] = ()) -> list[Candidate]:
-    """Return every candidate beside a fitted model, with the columns it would add to it."""
+def candidates(
+    balance: ForceBalance, fitted: Fitted, taken: Sequence[str] = (), *, events: bool = False
+) -> list[Candidate]:
+    """Return every candidate beside a fitted model, with the columns it would add to it.
+
+    With `events`, those only that happen once, at a moment that the residual shows.
+    """
     scales = Scales.of(balance, fitted)
     offset = fitted.coefficients[balance.size - 1] != 0.0 or any(ent.kind_of(e).bias for e in fitted.entries)
     kinds = [
-        k for k in searchable(balance) if k.name not in taken and not (offset and _only_bias(k, balance))
+        k
+        for k in searchable(balance)
+        if k.name not in taken and not (offset and _only_bias(k, balance)) and ent.happens_once(k) >= events
     ]
     points = {k: list(_points(k, scales, balance)) for k in kinds}
 

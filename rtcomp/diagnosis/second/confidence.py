@@ -18,9 +18,12 @@ from rtcomp.diagnosis.second.selection import Search
 from rtcomp.diagnosis.second.settings import ALIAS
 from rtcomp.diagnosis.second.significance import confidence_set, log_gain, probabilities
 from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats
 
 SET_LEVEL = 0.05
 """Level of the confidence set."""
+CELLS = 10
+"""Parts of a block over which models are compared: each with many rows, together many."""
 NEAR = 0.5
 """Part of the best screened gain from which on a candidate is fitted in another's place."""
 
@@ -49,16 +52,14 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         rest = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
         others = _others(fitter, found, i, rest, ends)
         models = [chosen, *others]
-        errors = [m.errors for m in models]
+        errors = [_by_cell(fitter, m) for m in models]
         members = set(confidence_set(errors, SET_LEVEL))
         best_gain = log_gain(rest.errors, chosen.errors)
-        members |= {
-            k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= (1.0 - ALIAS) * best_gain
-        }
+        least = (1.0 - ALIAS) * best_gain
+        members |= {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
         plainest = min(models[k].size for k in members)
         members = {k for k in members if models[k].size == plainest} | {0}
-        rows = float(np.mean(np.bincount(fitter.balance.block)))
-        weight = probabilities(errors, rows)
+        weight = probabilities(errors, float(np.mean(np.bincount(fitter.balance.block))) / CELLS)
         order = sorted(members, key=lambda k: (-weight[k], k))
         names = [_replaced(models[k], chosen, i) for k in order]
         kept = [j for j, n in enumerate(names) if n not in names[:j]]
@@ -73,6 +74,18 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
             )
         )
     return done
+
+
+def _by_cell(fitter: Fitter, model: Fitted) -> Floats:
+    """Return the squared error of a model in every cell that is not reserved, (C,).
+
+    What acts now and then, as a drive's limit, shows in some of them: of ten blocks it would be by chance.
+    """
+    block = fitter.balance.block
+    cell = np.arange(block.size) * (fitter.balance.blocks * CELLS) // block.size
+    used = fitter.use[block]
+    found = np.bincount(cell[used], model.residual[used] ** 2, fitter.balance.blocks * CELLS)
+    return np.asarray(found[np.bincount(cell[used], minlength=found.size) > 0] + 1e-300)
 
 
 def _replaced(model: Fitted, chosen: Fitted, at: int) -> str:

@@ -12,11 +12,13 @@ from rtcomp.kernels import Floats
 from rtcomp.recording.pieces import bridged
 from rtcomp.recording.reader import Recording
 
-MOST_ROWS = 60_000
+MOST_ROWS = 40_000
 """Rows of the recording that are used as they are; of longer ones windows are taken, evenly spread."""
 OVERSAMPLED = 10.0
 """Rate over the motion's bandwidth, from which on rows are averaged."""
-WINDOWS = 6
+BEFORE = 10_000
+"""Rows, at most, of the way to a window."""
+WINDOWS = 4
 """Windows of a long recording."""
 
 
@@ -28,11 +30,19 @@ class Segment:
     position: Floats
     voltage: Floats
     reference: Floats | None
+    source: Segment | None = None
+    """The rows as recorded, where these are means of them."""
+    before: Floats | None = None
+    """Positions (m) on the way to its first row, where the recording began earlier: friction remembers."""
 
     def part(self, rows: slice) -> Segment:
         """Return some of its rows."""
         reference = None if self.reference is None else self.reference[rows]
-        return Segment(self.time[rows], self.position[rows], self.voltage[rows], reference)
+        source = self.source
+        if source is not None:
+            factor = source.time.size // self.time.size
+            source = source.part(slice(rows.start * factor, rows.stop * factor))
+        return Segment(self.time[rows], self.position[rows], self.voltage[rows], reference, source)
 
 
 @dataclass(frozen=True)
@@ -60,6 +70,11 @@ class Data:
     def seconds(self) -> float:
         """Length of all segments (s)."""
         return float(sum(s.time.size for s in self.segments)) / self.rate
+
+    def as_recorded(self) -> Data:
+        """Return the rows that these are means of."""
+        sources = tuple(s.source or s for s in self.segments)
+        return Data(sources, self.rate * self.averaged, self.held)
 
     def with_input(self, *, held: bool) -> Data:
         """Return the same recordings with the command between rows taken to be held, or band-limited."""
@@ -95,22 +110,27 @@ def _segments(recording: Recording) -> list[Segment]:
 def averaged(segment: Segment, factor: int) -> Segment:
     """Return means of so many rows each; a command is held from the middle of its rows to the next."""
     count = segment.time.size // factor
+    used = segment.part(slice(0, count * factor))
 
     def mean(a: Floats) -> Floats:
-        return np.asarray(a[: count * factor].reshape(count, factor).mean(axis=1))
+        return np.asarray(a.reshape(count, factor).mean(axis=1))
 
     given = np.concatenate([[0.0], np.cumsum(segment.voltage)])
     edges = np.arange(count + 1) * factor + 0.5 * (factor - 1)
     held = np.diff(np.interp(edges, np.arange(given.size), given)) / factor
-    reference = None if segment.reference is None else mean(segment.reference)
-    return Segment(mean(segment.time), mean(segment.position), held, reference)
+    reference = None if used.reference is None else mean(used.reference)
+    return Segment(mean(used.time), mean(used.position), held, reference, used)
 
 
 def _windows(segment: Segment, count: int, rows: int) -> list[Segment]:
     if segment.time.size <= count * rows:
         return [segment]
     starts = np.linspace(0, segment.time.size - rows, count).astype(np.int64)
-    return [segment.part(slice(k, k + rows)) for k in starts.tolist()]
+    step = max(1, segment.time.size // BEFORE)
+    return [
+        replace(segment.part(slice(k, k + rows)), before=segment.position[: k + 1][::-step][::-1])
+        for k in starts.tolist()
+    ]
 
 
 def reversals(position: Floats) -> int:

@@ -30,6 +30,11 @@ def kind_of(entry: Mapping[str, Any]) -> type[Effect]:
     return catalogue.entry(str(entry["name"]))
 
 
+def happens_once(kind: type[Effect]) -> bool:
+    """Tell whether an effect is a single event, at a moment of its own."""
+    return any(p.name == MOMENT for p in kind.parameters)
+
+
 def build(entry: Mapping[str, Any]) -> Effect:
     """Build the effect of an entry; raise ConfigError where a value is out of its bounds."""
     return physics.build(entry)

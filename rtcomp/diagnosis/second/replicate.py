@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from rtcomp.control.pid import pid_preset, pid_state, pid_step, pid_vector
-from rtcomp.diagnosis.second.data import Data, Segment
+from rtcomp.diagnosis.second.data import Data, Segment, averaged
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics import Place, wires
 from rtcomp.physics.program import COUNT, Program, run_chain
@@ -33,20 +33,24 @@ LOST = 0.25
 def replicate(stage: Stage, data: Data, motion: list[Floats], noise: float, seed: int) -> Data | None:
     """Return the recordings that `stage` would have left, or None where it cannot be kept on the motion.
 
-    `motion` is the true position (m, (K,)) along each segment, `noise` (m rms) that of the reading.
+    `motion` is the true position (m, (K,)) along each segment, `noise` (m rms) that of a recorded reading.
+    Where rows are means, those that they are means of are simulated: a count at rest is no white noise.
     """
     random = np.random.default_rng(seed)
     low, high = data.stroke
-    counts = stage.sensor.resolution if data.averaged == 1 else 0.0  # the mean of counts is finer
+    counts = stage.sensor.resolution
+    recorded = data.as_recorded()
     rest = max(math.sqrt(max(noise**2 - counts**2 / 12.0, 0.0)), DITHER * counts)
     stage = stage.with_changes(sensor={"noise": rest, "resolution": counts})
     made: list[Segment] = []
-    for segment, x in zip(data.segments, motion, strict=True):
-        position, voltage = _simulated(stage, data, segment, x, random)
+    for means, segment, x in zip(data.segments, recorded.segments, motion, strict=True):
+        followed = x if segment is means else np.interp(segment.time, means.time, x)
+        position, voltage = _simulated(stage, recorded, segment, followed, random)
         off = position - segment.position
         if not np.all(np.isfinite(off)) or float(np.sqrt(np.mean(off**2))) > LOST * (high - low):
             return None
-        made.append(replace(segment, position=position, voltage=voltage))
+        new = replace(segment, position=position, voltage=voltage)  # its friction began there
+        made.append(replace(new, before=None) if segment is means else averaged(new, data.averaged))
     return replace(data, segments=tuple(made))
 
 

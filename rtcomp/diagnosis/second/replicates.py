@@ -7,8 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import ForceBalance
+from rtcomp.diagnosis.second.candidates import candidates
 from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.diagnosis.second.noise import Noise
 from rtcomp.diagnosis.second.replicate import replicate
 from rtcomp.diagnosis.second.screening import Screen
 from rtcomp.diagnosis.second.settings import REPLICATES
@@ -41,9 +44,13 @@ def null_of(balance: ForceBalance, fitted: Fitted, screen: Screen, gain: float, 
     except ConfigError:
         return _surrogates(balance, fitted, screen, seed)
     motion = [p.x for p in balance.paths()]
+    recorded = balance.data.as_recorded()
+    noise = balance.noise.rms if balance.data.averaged == 1 else Noise.of(stage, recorded).rms
+    names = ent.names(fitted.entries)
+    events = any(ent.happens_once(ent.kind_of(c.term.entry)) for c in screen.candidates)
 
     def one(number: int) -> tuple[float, float] | None:
-        data = replicate(stage, balance.data, motion, balance.noise.rms, 1000 * seed + number)
+        data = replicate(stage, balance.data, motion, noise, 1000 * seed + number)
         if data is None:
             return None
         other = balance.on(data)
@@ -51,6 +58,12 @@ def null_of(balance: ForceBalance, fitted: Fitted, screen: Screen, gain: float, 
         fitter.offset = fitted.coefficients[balance.size - 1] != 0.0
         again = fitter.fit(list(fitted.terms), fitted, steps=0)
         gains = screen.gains(free_columns(again), again.residual)
+        # Its own size is all that a single event has: the largest of these residuals, not of the recorded.
+        made = candidates(other, again, names, events=True) if events else []
+        if made:
+            gains += Screen(made, other.block, other.blocks, ~other.reserved).gains(
+                free_columns(again), again.residual
+            )
         scale = balance.power / max(other.power, 1e-300)
         return max(s.gain for s in gains), float(again.errors.sum()) * scale
 

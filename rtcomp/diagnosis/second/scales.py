@@ -109,13 +109,12 @@ def _listed(values: Floats) -> list[float]:
 
 def _periods(balance: ForceBalance, residual: Floats) -> Floats:
     """Return periods (m) of waves along the position, in the residual as force and as displacement."""
-    low, high = balance.data.stroke
     paths = balance.paths()
     x = balance.plain([p.x for p in paths])
     v = balance.plain([p.v for p in paths])
     u = balance.plain([s.voltage for s in balance.data.segments])
     force = as_force(balance, residual)
-    span = high - low
+    span = float(np.ptp(x))
     step = float(np.median(np.abs(np.diff(x)))) or span / 1000.0
     most = float(np.clip(span / max(2.0 * step, 4.0 * balance.grain, 1e-4 * span), 4.0, 1500.0))
     found: list[float] = []

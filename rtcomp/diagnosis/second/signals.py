@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rtcomp.diagnosis.bank import units_along
+from rtcomp.diagnosis.bank import deflections, units_along
 from rtcomp.diagnosis.path import Load, behind_play
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.cache import Cache, Group
@@ -64,13 +64,14 @@ class Signals:
         self.believed = [e for e in believed if _refitted(e)]
         """Entries of the belief that add a force: their sizes are refitted with the base."""
         self._fixed = [ent.build(e) for e in believed if not _refitted(e)]
+        friction = stage.friction
+        self._elements = list(friction.elements) if isinstance(friction, MaxwellSlip) else []
         self._cache = Cache()
 
     @property
     def believed_reaches(self) -> Floats:
         """Yield displacements (m) that the belief states."""
-        friction = self.stage.friction
-        return np.unique([r for _, r in friction.elements] if isinstance(friction, MaxwellSlip) else [])
+        return np.unique([r for _, r in self._elements])
 
     @property
     def size(self) -> int:
@@ -178,7 +179,7 @@ class Signals:
                 found.append(a)
             return found
 
-        def units(more: float = 0.0) -> list[Floats]:
+        def units(more: float = 0.0, some: np.ndarray | None = None) -> list[Floats]:
             found = []
             for k, (s, p) in enumerate(zip(self.data.segments, self.paths(sensors), strict=True)):
                 path = p
@@ -187,8 +188,14 @@ class Signals:
                     v = np.gradient(y, self.data.period)
                     path = Path(y, v, _second_difference(y, self.data.rate), p.measured)
                 pushed = replace(s, voltage=(1.0 + more) * s.voltage) if more else s
-                found.append(self._units(pushed, path, before, modifiers, weights if whole else None))
+                found.append(self._units(pushed, path, before, modifiers, weights if whole else None, some))
             return found
+
+        def of_sizes(sizes: Floats) -> list[Floats]:
+            held = weights if whole and weights is not None else self.weights
+            some = (sizes[len(BASE) - 1 :] != 0.0) | (held != 0.0)
+            kept = np.concatenate([sizes[: len(BASE) - 1], sizes[len(BASE) - 1 :][some]])
+            return [table @ kept for table in units(some=some)]
 
         def by_load() -> list[Floats]:
             held = self.weights if weights is None else weights
@@ -199,7 +206,7 @@ class Signals:
         key = (key_of(before), key_of(modifiers), key_of(sensors), behind, own)
         columns = [
             Group(("mass", key_of(hung), key_of(sensors), behind), mass),
-            Group(("units", *key), units),
+            Group(("units", *key), units, of_sizes, len(BASE) - 1 + self.reaches.size),
             Group(("offset",), lambda: [np.ones(s.time.size) for s in self.data.segments]),
         ]
         held = (weights if weights is not None else self.weights).tobytes()
@@ -220,10 +227,9 @@ class Signals:
     def weights(self) -> Floats:
         """Believed friction as stiffnesses (N/m) of the units."""
         found = np.zeros(self.reaches.size)
-        if isinstance(self.stage.friction, MaxwellSlip):
-            for k, r in self.stage.friction.elements:
-                at = int(np.argmin(np.abs(np.log(self.reaches / r))))
-                found[at] += k * r / self.reaches[at]
+        for k, r in self._elements:
+            at = int(np.argmin(np.abs(np.log(self.reaches / r))))
+            found[at] += k * r / self.reaches[at]
         return found
 
     def _units(
@@ -233,19 +239,26 @@ class Signals:
         before: Sequence[Effect],
         modifiers: Sequence[Effect],
         weights: Floats | None,
+        some: np.ndarray | None = None,
     ) -> Floats:
-        """Return the force (N, (K, p)) of each unit of damping and friction around the rows."""
+        """Return the force (N, (K, p)) around the rows of damping and of friction units, all or `some`."""
         motion = np.column_stack([segment.time, path.x, path.v, path.a, self._given(segment)])
-        held = self.weights if weights is None else weights
+        held, reaches = self.weights if weights is None else weights, self.reaches
+        start = self._start(segment)
+        if some is not None:
+            held, reaches, start = held[some], reaches[some], start[some]
         return units_along(
-            self.stage,
-            list(before),
-            list(modifiers),
-            self.reaches,
-            held,
-            np.ascontiguousarray(motion),
-            self.grain,
-        )
+            self.stage, list(before), list(modifiers), reaches, held, np.ascontiguousarray(motion),
+            self.grain, start,
+        )  # fmt: skip
+
+    def _start(self, segment: Segment) -> Floats:
+        """Return the deflections (m) of the friction units at the first row of a segment."""
+        if segment.before is None:
+            return np.zeros(self.reaches.size)
+        way, key = segment.before, ("start", float(segment.time[0]), segment.time.size)
+        found: Floats = self._cache.of(key, lambda: [deflections(way, self.reaches)])[0]
+        return found
 
     def _added(self, entry: Entry, sensors: Sequence[Effect]) -> Group:
         """Return the force that the motion needs for an entry that adds one."""

@@ -30,31 +30,35 @@ def filtered(
     table = np.atleast_2d(rows)
     size = table.shape[1]
     pad = max(2, min(int(PAD * size), size - 1))
-    left, right = table[:, pad:0:-1], table[:, -2 : -pad - 2 : -1]
+    total = size + 2 * pad
+    count = scipy.fft.next_fast_len(total, real=True)
+    long = np.zeros((table.shape[0], count))
+    long[:, :pad], long[:, pad : pad + size] = table[:, pad:0:-1], table
+    long[:, pad + size : total] = table[:, -2 : -pad - 2 : -1]
     if not noisy:
-        left, right = 2.0 * table[:, :1] - left, 2.0 * table[:, -1:] - right
-    long = np.concatenate([left, table, right], axis=1)
+        long[:, :pad] = 2.0 * table[:, :1] - long[:, :pad]
+        long[:, pad + size : total] = 2.0 * table[:, -1:] - long[:, pad + size : total]
     # A straight line has no place in a Fourier series; it is filtered by itself.
     ends = max(1, pad // 2) if noisy else 1
-    level, last = long[:, :ends].mean(axis=1)[:, None], long[:, -ends:].mean(axis=1)[:, None]
-    slope = (last - level) / (long.shape[1] - 1)
-    line = level + slope * np.arange(long.shape[1])
-    count = scipy.fft.next_fast_len(long.shape[1], real=True)
-    spectrum = scipy.fft.rfft(long - line, n=count, axis=1)
-    gain = _gain(response, count, rate)
-    at_rest = float(gain[0])
-    if derivative:
-        gain = gain * (2j * np.pi * np.fft.rfftfreq(count, 1.0 / rate))
-    out = scipy.fft.irfft(spectrum * gain, n=count, axis=1)[:, pad : pad + size]
+    level, last = long[:, :ends].mean(axis=1), long[:, total - ends : total].mean(axis=1)
+    slope = ((last - level) / (total - 1))[:, None]
+    line = level[:, None] + slope * np.arange(total)
+    long[:, :total] -= line
+    transformed = scipy.fft.rfft(long, axis=1, overwrite_x=True)
+    gain = _gain(response, count, rate, derivative)
+    at_rest = float(_gain(response, count, rate, False)[0])
+    transformed *= gain
+    out = scipy.fft.irfft(transformed, n=count, axis=1, overwrite_x=True)[:, pad : pad + size]
     out += at_rest * (slope * rate if derivative else line[:, pad : pad + size])
     return np.asarray(out.reshape(rows.shape))
 
 
-@lru_cache(maxsize=32)
-def _gain(response: Response, count: int, rate: float) -> Floats:
+@lru_cache(maxsize=64)
+def _gain(response: Response, count: int, rate: float, derivative: bool) -> np.ndarray:
     """Return a response at the frequencies of a transform of `count` rows."""
     frequency: Floats = np.asarray(np.fft.rfftfreq(count, 1.0 / rate), dtype=np.float64)
-    return np.asarray(response(frequency))
+    gain = np.asarray(response(frequency))
+    return gain * (2j * np.pi * frequency) if derivative else gain
 
 
 def spectrum(rows: list[Floats], rate: float) -> tuple[Floats, Floats]:
