@@ -49,12 +49,14 @@ def units_along(
     motion: Floats,
     grain: float,
     start: Floats | None = None,
+    least_parts: int = 1,
 ) -> Floats:
     """Return the force (N) of each unit around the rows of a motion, (K, 2 + reaches).
 
     `motion` is (K, 5): time (s), position (m), velocity, acceleration, the command held up to each row (V);
     `weights` (N/m) of the stop elements make the friction at hand; `start` (m) are their deflections before
-    the motion, nothing where it is not given. `drive` effects only tell the load.
+    the motion, nothing where it is not given. `drive` effects only tell the load. A row is cut into
+    `least_parts`, or more where an effect needs it.
     """
     units: list[Effect] = [
         ViscousFriction(coefficient=1.0),
@@ -70,7 +72,7 @@ def units_along(
     after = [e for e in after if e.name != ClosingBranches.name]
     program = Program([*before, *units, *bent, *after])
     row = float((motion[-1, 0] - motion[0, 0]) / max(motion.shape[0] - 1, 1))
-    parts = parts_of([*before, *after], row)
+    parts = max(parts_of([*before, *after], row), least_parts)
     out = np.empty((motion.shape[0], SPEED_UNITS + len(reaches)))
     mean = np.zeros_like(out) if parts > 1 else out[:1]
     w = np.zeros(COUNT)

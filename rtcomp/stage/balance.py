@@ -121,6 +121,18 @@ def parts_of(chain: Sequence[Effect], row: float) -> int:
 
 
 @compiled
+def between_rows(motion: Floats, k: int, share: float) -> float:
+    """Return the position (m) that `share` of a row before row `k`: the cubic by both rows' velocities."""
+    before = max(k - 1, 0)
+    row = motion[k, 0] - motion[before, 0]
+    then, now = motion[before, 1], motion[k, 1]
+    rest = 1.0 - share
+    line = now + share * (then - now)
+    bent = (then - now + row * motion[before, 2]) * share - (then - now + row * motion[k, 2]) * rest
+    return float(line + share * rest * bent)
+
+
+@compiled
 def along_row(w: Floats, motion: Floats, k: int, j: float, parts: int) -> None:
     """Put the wires to the end of part `j` (less a half: its middle) of `parts` of row `k` of a motion.
 
@@ -130,8 +142,8 @@ def along_row(w: Floats, motion: Floats, k: int, j: float, parts: int) -> None:
     share = 1.0 - j / parts
     w[TIME] = motion[k, 0] + share * (motion[before, 0] - motion[k, 0])
     w[STEP] = (motion[k, 0] - motion[before, 0]) / parts
-    w[POSITION] = motion[k, 1] + share * (motion[before, 1] - motion[k, 1])
-    w[MOVED] = (motion[k, 1] - motion[before, 1]) / parts
+    w[POSITION] = between_rows(motion, k, share)
+    w[MOVED] = w[POSITION] - between_rows(motion, k, share + 1.0 / parts)
     w[VELOCITY] = motion[k, 2] + share * (motion[before, 2] - motion[k, 2])
     w[ACCELERATION] = motion[k, 3]
     w[VOLTS] = motion[k, 4]

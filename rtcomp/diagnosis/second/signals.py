@@ -32,6 +32,8 @@ MOST_OWN = 10
 """Believed yield displacements up to which they are taken into the grid as they are."""
 BASE = ("mass", "viscous", "micro_damping")
 """Columns before those of the friction units."""
+PARTS = 2
+"""Parts of a row for friction: where it turns within one, the force at its ends is not that between."""
 MORE = 1e-3
 """Relative change of the command to which that of friction is looked at."""
 
@@ -249,7 +251,7 @@ class Signals:
             held, reaches, start = held[some], reaches[some], start[some]
         return units_along(
             self.stage, list(before), list(modifiers), reaches, held, np.ascontiguousarray(motion),
-            self.grain, start,
+            self.grain, start, PARTS,
         )  # fmt: skip
 
     def _start(self, segment: Segment) -> Floats:
