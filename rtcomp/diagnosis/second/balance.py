@@ -98,7 +98,7 @@ class ForceBalance(Signals):
 
     def _cut_blocks(self) -> None:
         assert self._whitening is not None
-        kept = [s.time[self._whitening.rows(s.time.size)].size for s in self.data.segments]
+        kept = [s.time[self._whitening.rows(s)].size for s in self.data.segments]
         turns = sum(reversals(s.position) for s in self.data.segments)
         count = min(self.data.seconds / BLOCK_SECONDS, turns / BLOCK_REVERSALS if turns else np.inf)
         self.blocks = int(np.clip(count, FEWEST, MOST))
@@ -223,13 +223,13 @@ class ForceBalance(Signals):
     def _filtered(self, made: list[Floats]) -> Floats:
         """Return signals (K, p) or (K,), one array a segment, filtered, thinned and joined: (p, n)."""
         parts = []
-        for signals in made:
+        for segment, signals in zip(self.data.segments, made, strict=True):
             table = np.ascontiguousarray(np.atleast_2d(signals.T))
             if self._whitening is None:
                 parts.append(table[:, 3:-3])
                 continue
             # What the ends have wrong would be drawn out over all that a filter remembers.
-            lead, rows = self._whitening.lead, self._whitening.rows(table.shape[1])
+            lead, rows = self._whitening.lead, self._whitening.rows(segment)
             white = filtered(table[:, lead:-lead], self.data.rate, self._whitening.response, noisy=True)
             parts.append(white[:, rows.start - lead : rows.stop - lead : rows.step])
         return np.concatenate(parts, axis=1)
@@ -260,8 +260,8 @@ class ForceBalance(Signals):
     def smooth(self, signals: Sequence[Floats]) -> Floats:
         """Return signals (K,), one a segment, below the motion's bandwidth on the compared rows, (n,)."""
         parts = []
-        for s in signals:
-            lead, rows = self.whitening.lead, self.whitening.rows(s.size)
+        for segment, s in zip(self.data.segments, signals, strict=True):
+            lead, rows = self.whitening.lead, self.whitening.rows(segment)
             below = filtered(s[lead:-lead], self.data.rate, self.noise.wiener, noisy=True)
             parts.append(below[rows.start - lead : rows.stop - lead : rows.step])
         return np.concatenate(parts)
@@ -269,8 +269,8 @@ class ForceBalance(Signals):
     def plain(self, signals: Sequence[Floats]) -> Floats:
         """Return one unfiltered number a compared row, (n,), of signals (K,), one a segment."""
         assert self._whitening is not None
-        rows = [s[self._whitening.rows(s.size)] for s in signals]
-        return np.concatenate(rows)
+        pairs = zip(self.data.segments, signals, strict=True)
+        return np.concatenate([s[self._whitening.rows(segment)] for segment, s in pairs])
 
 
 __all__ = ["BASE", "ForceBalance", "System"]

@@ -18,6 +18,8 @@ OVERSAMPLED = 10.0
 """Rate over the motion's bandwidth, from which on rows are averaged."""
 BEFORE = 10_000
 """Rows, at most, of the way to a window."""
+RUN_IN = 0.2
+"""Part of a window that is not compared."""
 WINDOWS = 4
 """Windows of a long recording."""
 
@@ -34,6 +36,8 @@ class Segment:
     """The rows as recorded, where these are means of them."""
     before: Floats | None = None
     """Positions (m) on the way to its first row, where the recording began earlier: friction remembers."""
+    run_in: int = 0
+    """First rows that are not compared: what swings or lags has no state at the beginning of a window."""
 
     def part(self, rows: slice) -> Segment:
         """Return some of its rows."""
@@ -128,7 +132,11 @@ def _windows(segment: Segment, count: int, rows: int) -> list[Segment]:
     starts = np.linspace(0, segment.time.size - rows, count).astype(np.int64)
     step = max(1, segment.time.size // BEFORE)
     return [
-        replace(segment.part(slice(k, k + rows)), before=segment.position[: k + 1][::-step][::-1])
+        replace(
+            segment.part(slice(k, k + rows)),
+            before=segment.position[: k + 1][::-step][::-1],
+            run_in=int(RUN_IN * rows) if k else 0,
+        )
         for k in starts.tolist()
     ]
 

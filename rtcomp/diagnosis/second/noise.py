@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtcomp.diagnosis.second.data import Data
+from rtcomp.diagnosis.second.data import Data, Segment
 from rtcomp.diagnosis.second.spectrum import Response, interpolated, spectrum
 from rtcomp.kernels import Floats
 from rtcomp.stage.stage import Stage
@@ -84,6 +84,7 @@ class Whitening:
         lead = LEAD if data.held else RINGING
         return cls(response, white, thinning, lead, lead + max(1, int(2.0 * data.rate / high)))
 
-    def rows(self, size: int) -> slice:
-        """Return the rows of a segment of `size` rows that are compared."""
-        return slice(self.edge, max(size - self.edge, self.edge + 1), self.thinning)
+    def rows(self, segment: Segment) -> slice:
+        """Return the rows of a segment that are compared."""
+        first = max(self.edge, segment.run_in)
+        return slice(first, max(segment.time.size - self.edge, first + 1), self.thinning)

@@ -12,12 +12,12 @@ from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.result import Diagnosis, Place
 from rtcomp.diagnosis.second.answer import answer
 from rtcomp.diagnosis.second.balance import ForceBalance
-from rtcomp.diagnosis.second.baseline import baseline, with_offset
+from rtcomp.diagnosis.second.baseline import baseline, settle, with_offset
 from rtcomp.diagnosis.second.confidence import alternatives
 from rtcomp.diagnosis.second.data import load_data
 from rtcomp.diagnosis.second.fit import Fitted, Fitter
 from rtcomp.diagnosis.second.noise import Noise
-from rtcomp.diagnosis.second.selection import first_gain, search
+from rtcomp.diagnosis.second.selection import Search, first_gain, search
 from rtcomp.diagnosis.second.settings import BUDGET
 from rtcomp.diagnosis.second.validation import Reserved
 from rtcomp.diagnosis.second.where import Compared, as_force
@@ -26,6 +26,7 @@ from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
 
 Progress = Callable[[float, str], None]
+BAND_LIMITED = "the command is taken as band-limited between rows, which fits better than held"
 Located = Callable[[float, Sequence[Place]], None]
 """Told, before anything is named, what part of the force the refitted stage leaves open (rms), and where."""
 
@@ -65,31 +66,31 @@ def _diagnosed(
     say: Progress = progress or (lambda _part, _what: None)
     ends = time.monotonic() + budget
     say(0.0, "balance")
-    balance, base, notes = _objective(stage, recordings, held)
+    objectives = _objectives(stage, recordings, held)
     if time.monotonic() > ends:
         raise RtcompError(f"the budget of {budget:g} s ended before the stage was refitted; give it more")
+    balance, base = objectives[0]
     view = Compared(balance)
     before = as_force(balance, base.residual)
     if located is not None:
         left = (base.sse / max(balance.power, 1e-300)) ** 0.5
         located(left, locate(view, before, None, seed, stage.axis))
-    fitter = Fitter(balance)
-    base = with_offset(fitter, base)
     say(1.0, "balance")
-    found = search(fitter, base, ends, say, seed)
+    fitter, found = _searched(objectives, ends, say, seed)
     say(0.0, "tell apart")
     sets = alternatives(fitter, found, ends)
     say(0.5, "judge")
-    done = answer(stage, fitter, found, sets, Reserved(balance), seed)
+    done = answer(stage, fitter, found, sets, Reserved(fitter.balance), seed)
     say(1.0, "judge")
+    notes = [BAND_LIMITED] if len(objectives) > 1 and not fitter.balance.data.held else []
     notes += [f"not tried within {budget:g} s: {what}" for what in found.not_tried]
     return replace(done, notes=[*notes, *done.notes])
 
 
-def _objective(
+def _objectives(
     stage: Stage, recordings: Sequence[Recording], held: bool | None
-) -> tuple[ForceBalance, Fitted, list[str]]:
-    """Return the force balance and the refitted stage, with the command taken as it fits best.
+) -> list[tuple[ForceBalance, Fitted]]:
+    """Return the force balance and the refitted stage, for each way to take the command, the better first.
 
     A loop holds its command from row to row. Where there is no reference the command may be a measured signal
     that goes on between rows: both ways are looked at, each with the best candidate beside it.
@@ -103,9 +104,35 @@ def _objective(
         balance = ForceBalance(stage, load_data(recordings, held=way, bandwidth=bandwidth))
         made.append((balance, baseline(balance)))
     if len(made) == 1:
-        return (*made[0], [])
-    scores = [float(np.mean(np.log(f.errors / b.power))) - first_gain(b, f) for b, f in made]
-    if scores[0] <= scores[1]:
-        return (*made[0], [])
-    note = "the command is taken as band-limited between rows, which fits better than held"
-    return (*made[1], [note])
+        return made
+    return sorted(made, key=lambda pair: _left(*pair) - first_gain(*pair))
+
+
+def _left(balance: ForceBalance, model: Fitted) -> float:
+    """Return the logarithm of what a model leaves of the drive's force."""
+    return float(np.mean(np.log(model.errors / balance.power)))
+
+
+def _searched(
+    objectives: Sequence[tuple[ForceBalance, Fitted]], ends: float, say: Progress, seed: int
+) -> tuple[Fitter, Search]:
+    """Return the search on the first objective, or on the second where a model found fits better there.
+
+    What is missing may hide which way the command goes between rows, and the wrong way looks like a delay.
+    """
+    balance, base = objectives[0]
+    fitter = Fitter(balance)
+
+    def doubted(model: Fitted) -> bool:
+        other = Fitter(objectives[1][0])
+        settle(other, model.terms)
+        return _left(other.balance, other.fit(model.terms)) < _left(balance, model)
+
+    doubt = doubted if len(objectives) > 1 else None
+    found = search(fitter, with_offset(fitter, base), ends, say, seed, doubt)
+    if not found.doubted:
+        return fitter, found
+    balance, base = objectives[1]
+    fitter = Fitter(balance)
+    settle(fitter)
+    return fitter, search(fitter, with_offset(fitter, fitter.fit([])), ends, say, seed)

@@ -50,7 +50,8 @@ def replicate(stage: Stage, data: Data, motion: list[Floats], noise: float, seed
         if not np.all(np.isfinite(off)) or float(np.sqrt(np.mean(off**2))) > LOST * (high - low):
             return None
         new = replace(segment, position=position, voltage=voltage)  # its friction began there
-        made.append(replace(new, before=None) if segment is means else averaged(new, data.averaged))
+        new = new if segment is means else averaged(new, data.averaged)
+        made.append(replace(new, before=None, run_in=means.run_in))
     return replace(data, segments=tuple(made))
 
 

@@ -48,10 +48,22 @@ class Search:
     not_tried: list[str] = field(default_factory=list)
     dropped: list[str] = field(default_factory=list)
     """What was found and not kept, and why."""
+    doubted: bool = False
+    """Whether the search ended because its objective was doubted."""
 
 
-def search(fitter: Fitter, baseline: Fitted, ends: float, say: Say, seed: int = 0) -> Search:
-    """Return the best model that the one test accepts; stops at the time `ends` (time.monotonic)."""
+def search(
+    fitter: Fitter,
+    baseline: Fitted,
+    ends: float,
+    say: Say,
+    seed: int = 0,
+    doubted: Callable[[Fitted], bool] | None = None,
+) -> Search:
+    """Return the best model that the one test accepts; stops at the time `ends` (time.monotonic).
+
+    Stops too where the objective itself is `doubted` because of the best model so far.
+    """
     found = Search(baseline, baseline)
     everything = float(baseline.errors.sum())
     beam, parents = [baseline], {id(baseline): everything}
@@ -93,6 +105,9 @@ def search(fitter: Fitter, baseline: Fitted, ends: float, say: Say, seed: int = 
             break
         beam, grown = _resettled(fitter, found, beam, grown, parents)
         everything = float(found.baseline.errors.sum())
+        if doubted is not None and doubted(beam[0]):
+            found.doubted = True
+            break
     _solid(fitter, found)
     return found
 

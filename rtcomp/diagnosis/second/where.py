@@ -71,7 +71,7 @@ def as_force(balance: ForceBalance, residual: Floats) -> Floats:
 
     out, at = [], 0
     for s in balance.data.segments:
-        count = s.time[white.rows(s.time.size)].size
+        count = s.time[white.rows(s)].size
         out.append(filtered(residual[at : at + count], rate, back, noisy=True))
         at += count
     return np.concatenate(out)
