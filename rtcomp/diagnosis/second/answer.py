@@ -88,7 +88,7 @@ def answer(
     where = (
         [] if verdict == "consistent" else locate(view, before, after if named else None, seed, believed.axis)
     )
-    seen = sights(fitter, final, found.null)
+    seen = sights(fitter, final, found.null, found.beside if final is found.chosen else None)
     names = {n for e in named for n in e.names}
     return Diagnosis(
         verdict,

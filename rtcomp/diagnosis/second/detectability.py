@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,14 +18,17 @@ from rtcomp.diagnosis.second.settings import LEVEL
 from rtcomp.diagnosis.second.significance import Null
 
 
-def sights(fitter: Fitter, fitted: Fitted, null: Null | None) -> list[Sight]:
+def sights(
+    fitter: Fitter, fitted: Fitted, null: Null | None, beside: Sequence[Candidate] | None = None
+) -> list[Sight]:
     """Return from which size on every effect would have been seen beside a fitted model.
 
     To first order: the part of its force that the model cannot make up for, against the gain that chance
     makes in one of a hundred recordings. Of an effect at several starting values, the plainest counts.
+    `beside` are all candidates beside the model, where they are known.
     """
     balance = fitter.balance
-    made = candidates(balance, fitted, ent.names(fitted.entries))
+    made = beside or candidates(balance, fitted, ent.names(fitted.entries))
     use = np.isin(balance.block, np.flatnonzero(fitter.use))
     model = free_columns(fitted)[:, use]
     norm = np.sqrt(np.einsum("ij,ij->i", model, model))

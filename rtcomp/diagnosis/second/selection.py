@@ -41,6 +41,8 @@ class Search:
     chosen: Fitted
     null: Null | None = None
     """Of the chosen model."""
+    beside: list[Candidate] | None = None
+    """All candidates beside the chosen model, where they were looked at."""
     alternatives: list[Fitted] = field(default_factory=list)
     """Models with one entry of the chosen one replaced by another effect."""
     screened: list[tuple[str, float, float]] = field(default_factory=list)
@@ -77,11 +79,12 @@ def search(
         if look is None or look.null is None:
             break
         null = look.null
-        found.chosen, found.null = beam[0], null
+        found.chosen, found.null, found.beside = beam[0], null, look.candidates
         found.alternatives = [g for g in grown if len(g.terms) == len(beam[0].terms) and g is not beam[0]]
         if step == 0:
             found.screened = _table(look.candidates, look.screened, null)
-        if step == MOST_EFFECTS or null.settled(look.gain, float(beam[0].errors.sum()), LEVEL):
+        done = null.settled(look.gain, float(beam[0].errors.sum()), LEVEL)
+        if done or step == MOST_EFFECTS or _exhausted(fitter.balance, beam[0], everything):
             break
         grown = _grow(fitter, beam[0], look.candidates, look.screened, ends)
         for other in beam[1:] if null.p_value(look.gain) < LEVEL else []:
@@ -123,7 +126,7 @@ def _solid(fitter: Fitter, found: Search) -> None:
         why = f"{', '.join(span.bound)} at its bound" if span.bound else "its size may be nothing"
         found.dropped.append(f"{name} is not named: {why}")
         kept = [t for i, t in enumerate(found.chosen.terms) if i != weak[-1]]
-        found.chosen, found.alternatives = fitter.fit(kept, found.chosen), []
+        found.chosen, found.alternatives, found.beside = fitter.fit(kept, found.chosen), [], None
 
 
 def _resettled(
@@ -242,6 +245,12 @@ def _accepted(
     if p >= LEVEL or gained <= LEAST_GAIN * everything:
         return False
     return relative_error(balance, parent) ** 2 - relative_error(balance, model) ** 2 > NEGLIGIBLE**2
+
+
+def _exhausted(balance: ForceBalance, model: Fitted, everything: float) -> bool:
+    """Tell whether a model leaves too little for any further effect to matter."""
+    little = float(model.errors.sum()) <= LEAST_GAIN * everything
+    return little or relative_error(balance, model) <= NEGLIGIBLE
 
 
 def _parent(model: Fitted, beam: Sequence[Fitted]) -> Fitted:
