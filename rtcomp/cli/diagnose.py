@@ -46,6 +46,10 @@ COLUMNS = ("time", "position", "voltage", "reference", "enabled", "status", "ove
     "--budget", type=click.FloatRange(0.0, min_open=True), default=60.0, show_default=True, metavar="SECONDS",
     help="Ends the search with the best answer so far (second method).",
 )  # fmt: skip
+@click.option(
+    "--assume-units", is_flag=True,
+    help="Where a column looks to be in another unit than SI, take it so, and say it.",
+)  # fmt: skip
 @json_option
 def diagnose(
     recordings: tuple[Path, ...],
@@ -58,6 +62,7 @@ def diagnose(
     method: str,
     between: str | None,
     budget: float,
+    assume_units: bool,
     as_json: bool,
 ) -> None:
     """Say where the stage and the RECORDINGs differ, which physics is missing, and what it explains.
@@ -75,6 +80,7 @@ def diagnose(
     from functools import partial
 
     from rtcomp.diagnosis.admit import admit
+    from rtcomp.diagnosis.readings import in_si_units
     from rtcomp.recording.acted import as_acted
     from rtcomp.recording.driven import driven
     from rtcomp.recording.reader import read
@@ -83,9 +89,10 @@ def diagnose(
     stage = Stage.load(stage_file)
     read_ones = [as_acted(read(path, mapping, rate_hz=rate, only=COLUMNS)) for path in recordings]
     data = [part for one in read_ones for part in driven(one)]
+    data, assumed = in_si_units(stage, data, assume=assume_units)
     several = len(data) > 1
     notes = [f"in {r.path.name}: {note}" if several else note for r in data for note in r.notes]
-    notes += admit(stage, data)
+    notes += [*assumed, *admit(stage, data)]
 
     from rtcomp.diagnosis.diagnose import diagnose as first
     from rtcomp.diagnosis.second.pipeline import diagnose as second

@@ -17,6 +17,7 @@ from rtcomp.diagnosis import excitation
 from rtcomp.diagnosis.stretches import LEAST_ROWS, stretches
 from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.kernels import Floats
+from rtcomp.physics import catalogue
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.balance import force_balance
 from rtcomp.stage.simulate import Simulator, largest_step
@@ -44,7 +45,7 @@ def admit(stage: Stage, recordings: Sequence[Recording]) -> list[str]:
     Raises RecordingError for recordings of different rates, of another kind of axis, given twice, too short,
     without motion or command, clipped throughout, mostly bridged, without a reversal, and where the force
     balance shows that columns are swapped, scaled or of the wrong sign; ConfigError for a stage that cannot
-    be simulated.
+    be simulated, or has an effect beyond its physical bounds.
     """
     if not recordings:
         raise RecordingError("no recording is given; a diagnosis needs at least one")
@@ -52,6 +53,7 @@ def admit(stage: Stage, recordings: Sequence[Recording]) -> list[str]:
     _long_enough(recordings)
     for recording in recordings:
         _same_axis(stage, recording)
+    _physical(stage)
     _can_be_simulated(stage, recordings[0].rate_hz)
     _whole_enough(recordings)
     notes = [_named(note, r, recordings) for r in recordings for note in _fits(stage, r)]
@@ -136,6 +138,19 @@ def _axis_of(stage: Any) -> str | None:
         return None
     axis = section.get("axis", "linear")
     return axis if axis in ("linear", "rotary") else None
+
+
+def _physical(stage: Stage) -> None:
+    """Raise ConfigError where a believed effect has a number that no axis has."""
+    for entry in stage.mechanics.effects:
+        kind = catalogue.entry(str(entry["name"]))
+        for p in kind.parameters:
+            value = entry.get(p.name)
+            if isinstance(value, int | float) and value < p.lowest:
+                raise ConfigError(
+                    f"the stage's {kind.name} has {p.name} {value:g} {p.unit}; physical is "
+                    f"[{p.lowest:g}, {p.high:g}]; correct it or leave the effect out"
+                )
 
 
 def _can_be_simulated(stage: Stage, rate_hz: float) -> None:

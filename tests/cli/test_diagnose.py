@@ -90,6 +90,22 @@ def test_bad_options_of_the_second_method(folder: Path, option: str, value: str,
     assert not (folder / "new").exists()
 
 
+def test_another_unit_is_refused_in_one_line_or_assumed_and_said(folder: Path) -> None:
+    with h5py.File(folder / "stage.h5") as file:
+        columns = {name: file[name][()] for name in ("time", "position", "reference", "voltage")}
+    rows = np.column_stack(
+        [1e3 * columns["time"], *(columns[n] for n in ("position", "reference", "voltage"))]
+    )
+    header = "time,position,reference,voltage"
+    np.savetxt(folder / "ms.csv", rows, delimiter=",", header=header, comments="")
+    given = ("diagnose", "ms.csv", "--stage", "stage.yaml", "--method", "second")
+    refused(*given, "--out", "ms", at=folder, says=["time in ms", "1 Hz", "--assume-units"])
+    assert not (folder / "ms").exists()
+    run = rtcomp(*given, "--out", "ms", "--assume-units", at=folder, timeout=600)
+    assert (run.returncode, run.stderr) == (0, "")
+    assert "time is taken to be in ms" in run.stdout
+
+
 def test_the_concealed_effect_is_named_and_explains_the_recording(diagnosed: dict[str, Any]) -> None:
     assert diagnosed["verdict"] == "missing-physics"
     (effect,) = diagnosed["effects"]

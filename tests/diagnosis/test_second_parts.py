@@ -23,6 +23,7 @@ from rtcomp.diagnosis.second.significance import Null, confidence_set, log_gain,
 from rtcomp.diagnosis.second.spectrum import filtered, spectrum
 from rtcomp.diagnosis.second.stage_of import stage_of
 from rtcomp.diagnosis.second.validation import Reserved
+from rtcomp.errors import RecordingError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, catalogue
 
@@ -148,6 +149,17 @@ def test_reserved_blocks_judge_once() -> None:
     assert errors["before"] < 3.0 * errors["noise"] + 0.01
     with pytest.raises(RuntimeError, match="judged already"):
         reserved.judge({"before": believed})
+
+
+def test_a_judgement_needs_motion_in_the_reserved_blocks() -> None:
+    believed, moving = stage(), there_and_back(20.0)
+    t = np.arange(moving.size) / 1000.0
+    resting = np.any([np.abs(t - middle) < 1.6 for middle in (5.0, 15.0)], axis=0)  # the third block of five
+    balance = ForceBalance(believed, load_data([run(believed, np.where(resting, 0.0, moving))]))
+    baseline(balance)
+    assert balance.blocks == 10
+    with pytest.raises(RecordingError, match="nothing moves in the part kept for the judgement"):
+        Reserved(balance)
 
 
 def test_a_fit_is_blind_to_reserved_rows() -> None:

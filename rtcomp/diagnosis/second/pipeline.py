@@ -70,6 +70,7 @@ def _diagnosed(
     if time.monotonic() > ends:
         raise RtcompError(f"the budget of {budget:g} s ended before the stage was refitted; give it more")
     balance, base = objectives[0]
+    reserved = Reserved(balance)
     view = Compared(balance)
     before = as_force(balance, base.residual)
     if located is not None:
@@ -80,7 +81,9 @@ def _diagnosed(
     say(0.0, "tell apart")
     sets = alternatives(fitter, found, ends)
     say(0.5, "judge")
-    done = answer(stage, fitter, found, sets, Reserved(fitter.balance), seed)
+    if fitter.balance is not balance:
+        reserved = Reserved(fitter.balance)
+    done = answer(stage, fitter, found, sets, reserved, seed)
     say(1.0, "judge")
     notes = [BAND_LIMITED] if len(objectives) > 1 and not fitter.balance.data.held else []
     notes += [f"not tried within {budget:g} s: {what}" for what in found.not_tried]

@@ -7,14 +7,28 @@ from collections.abc import Mapping
 import numpy as np
 
 from rtcomp.diagnosis.second.balance import ForceBalance
+from rtcomp.errors import RecordingError
 from rtcomp.stage.stage import Stage
+
+LEAST_FORCE = 0.01
+"""Part of the other blocks' force (rms) that the reserved ones must have to judge by it."""
 
 
 class Reserved:
-    """Blocks that took no part in fitting or selection; they judge once."""
+    """Blocks that took no part in fitting or selection; they judge once.
+
+    Raises RecordingError where nothing happens in them.
+    """
 
     def __init__(self, balance: ForceBalance) -> None:
         self._balance, self._judged = balance, False
+        force, rows = balance.drive_force(), balance.reserved[balance.block]
+        here, elsewhere = float(np.std(force[rows])), float(np.std(force[~rows]))
+        if here < LEAST_FORCE * elsewhere:
+            raise RecordingError(
+                f"nothing moves in the part kept for the judgement: its force varies by {here:.3g} N, "
+                f"that of the rest by {elsewhere:.3g} N; record motion throughout, or cut the rests"
+            )
 
     def judge(self, stages: Mapping[str, Stage]) -> dict[str, float]:
         """Return the relative force error (rms over rms) of each stage, and as ``noise`` the sensor's.
