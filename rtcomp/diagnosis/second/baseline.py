@@ -14,6 +14,8 @@ from rtcomp.kernels import Floats
 
 DENSE = 64
 """Yield displacements that are tried at first, over the whole range."""
+SPEEDS = 9
+"""Speeds below which micro-damping may act, where the belief has none."""
 FINER = 3
 """Times finer they stand around those found, in the second try."""
 SLIGHT = 1e-3
@@ -32,6 +34,23 @@ def baseline(balance: ForceBalance) -> Fitted:
     return fitter.fit([])
 
 
+def _damp(fitter: Fitter, terms: Sequence[Term]) -> None:
+    """Let micro-damping act below the speed that fits best, where the belief leaves it open."""
+    balance = fitter.balance
+    if balance.stage.mechanics.micro_damping > 0.0 or balance.without("micro_damping"):
+        return
+    v = np.abs(balance.plain([p.v for p in balance.paths()]))
+    moving = v[v > 1e-3 * v.max()]
+    if not moving.size:
+        return
+    left: dict[float, float] = {}
+    slow, fast = (float(np.quantile(moving, q)) for q in (0.02, 0.9))
+    for speed in np.geomspace(slow, fast, SPEEDS).tolist():
+        balance.damp_below(speed)
+        left[speed] = fitter.fit(terms, steps=0).sse
+    balance.damp_below(min(left, key=lambda speed: left[speed]))
+
+
 def with_offset(fitter: Fitter, fitted: Fitted) -> Fitted:
     """Return the belief refitted beside a constant force where that matters too little to be named.
 
@@ -47,7 +66,7 @@ def with_offset(fitter: Fitter, fitted: Fitted) -> Fitted:
 
 
 def settle(fitter: Fitter, terms: Sequence[Term] = ()) -> None:
-    """Put the grid of yield displacements where a model of `terms` has friction.
+    """Put the grid of yield displacements where a model of `terms` has friction, micro-damping likewise.
 
     Stiffnesses that must not be negative come out sparse: of a dense grid, a dozen units are not zero. These
     are kept beside the believed ones and a coarse grid, so that candidates find friction that can give way.
@@ -67,6 +86,7 @@ def settle(fitter: Fitter, terms: Sequence[Term] = ()) -> None:
     skeleton = coarse[::2]
     far = np.array([not kept.size or np.min(np.abs(np.log(kept / r))) > step * FINER for r in skeleton])
     balance.put(np.concatenate([kept, skeleton[far]]), step * FINER)
+    _damp(fitter, terms)
 
 
 def _needed(balance: ForceBalance, fitted: Fitted) -> Floats:

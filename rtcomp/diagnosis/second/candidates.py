@@ -24,6 +24,8 @@ from rtcomp.physics import Effect, Parameter, catalogue
 
 SMALL = 0.05
 """Size of a dimensionless parameter at which its first-order effect is looked at."""
+NOT_IN_PROPORTION = ("s", "V")
+"""Units of what shifts or cuts a signal: far from neutral it does not act in proportion; tried there too."""
 POINT = 1e-2
 """Relative size of a step that is taken to be first order."""
 
@@ -112,6 +114,11 @@ def _points(kind: type[Effect], scales: Scales, balance: ForceBalance) -> Iterat
             ]
             for values in itertools.product(*ranges):
                 yield {**base, **still, **dict(zip([p.name for p in moved], values, strict=True))}, linear
+        for name in [] if ent.adds_force(kind) else kind.linear:
+            p = ent.parameter(kind, name)
+            if name in base and p.unit in NOT_IN_PROPORTION:
+                still = {q.name: (scales.of_parameter(q, kind) or [0.0])[0] for q in nonlinear}
+                yield from (({**base, **still, name: value}, "") for value in scales.of_parameter(p, kind))
 
 
 def _searched(kind: type[Effect], p: Parameter) -> bool:

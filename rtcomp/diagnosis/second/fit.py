@@ -270,7 +270,7 @@ class Fitter:
             for p in ent.free_parameters(term.entry, linear=False):
                 if p.name not in term.free:
                     continue
-                value, most = float(term.entry[p.name]), p.high
+                value, least, most = float(term.entry[p.name]), p.lowest, p.high
                 log = p.lowest >= 0.0 and value > 0.0
                 step = 0.02 if log else max(0.02 * abs(value), 1e-9 * (high - low if p.unit == "m" else 1.0))
                 if p.unit == ent.PHASE:
@@ -278,11 +278,15 @@ class Fitter:
                 elif p.name == ent.PERIOD:
                     # A wave longer than the stroke is a slope by another name.
                     step, most = min(0.02, 0.02 * value / (high - low)), min(p.high, LONGEST * (high - low))
-                elif waves and p.unit == "Hz":
-                    step = min(0.02, 0.01 / (value * self.balance.data.seconds))
+                elif p.unit == "Hz":
+                    # Beyond the motion's bandwidth nothing swings that the recording could show.
+                    most = min(p.high, self.balance.noise.bandwidth)
+                    step = min(0.02, 0.01 / (value * self.balance.data.seconds)) if waves else step
+                elif p.unit == "s":
+                    least = max(p.lowest, min(self.balance.data.period, value))
                 elif p.unit == "m" and p.lowest < 0.0 and p.name not in kind.linear:
                     step = 0.002 * (high - low)
-                found.append(Free(i, p.name, p.lowest, most, log, step))
+                found.append(Free(i, p.name, least, most, log, step))
         return found
 
     def _tangents(

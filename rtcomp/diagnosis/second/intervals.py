@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,8 @@ from rtcomp.diagnosis.extend import level_and_reach
 from rtcomp.diagnosis.result import Value
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import BASE, ForceBalance
-from rtcomp.diagnosis.second.fit import ONCE, Fitted
+from rtcomp.diagnosis.second.fit import ONCE, Fitted, left_out
+from rtcomp.diagnosis.second.regression import Grams
 from rtcomp.kernels import Floats
 from rtcomp.stage.stage import Stage
 from rtcomp.units import for_axis
@@ -50,9 +51,11 @@ def told(balance: ForceBalance, fitted: Fitted) -> list[Told]:
     factor = float(student.ppf(0.975, max(fitted.without.shape[0] - 1, 1)))
     axis = balance.stage.axis
     found = []
+    held = _shapes_held(balance, fitted)
     for i, (term, span) in enumerate(zip(fitted.terms, spans, strict=True)):
         kind = ent.kind_of(term.entry)
         without, once = _without(fitted, i, span), _once(balance, fitted, i, span)
+        alone = _without(held, i, span)
         values, neutral, bound = {}, [], []
         for p in kind.parameters:
             if p.name not in term.entry:
@@ -63,7 +66,7 @@ def told(balance: ForceBalance, fitted: Fitted) -> list[Told]:
                 apart = without[p.name] - value
                 if p.unit == ent.PHASE:
                     apart = (apart + np.pi) % (2.0 * np.pi) - np.pi
-                sd = float(np.sqrt(max(scatter(apart[:, None])[0, 0], 0.0)))
+                sd = _deviation(apart)
                 size = 2.0 if p.unit == ent.PHASE else abs(value)
                 half = math.hypot(factor * max(sd, once.get(p.name, 0.0)), MODEL * size)
                 if _at_bound(value, p.lowest, p.high):
@@ -73,9 +76,29 @@ def told(balance: ForceBalance, fitted: Fitted) -> list[Told]:
             low, high = max(value - half, p.low), min(value + half, p.high)
             values[p.name] = Value(value, low, high, for_axis(p.unit, axis))
             if p.name in kind.linear and p.name in without:
-                neutral.append(low <= ent.neutral(kind, p.name) <= high)
+                spread = max(_deviation(alone[p.name] - value), once.get(p.name, 0.0))
+                half = math.hypot(factor * spread, MODEL * abs(value))
+                neutral.append(abs(value - ent.neutral(kind, p.name)) <= half)
         found.append(Told(values, bool(neutral) and all(neutral), tuple(bound)))
     return found
+
+
+def _deviation(without: Floats) -> float:
+    """Return the standard deviation of a number found without each block in turn, (B,)."""
+    return float(np.sqrt(max(scatter(without[:, None])[0, 0], 0.0)))
+
+
+def _shapes_held(balance: ForceBalance, fitted: Fitted) -> Fitted:
+    """Return the fit with only the sizes of its effects free: what is nothing has no shape."""
+    sizes = [k for k, f in enumerate(fitted.free) if f.name in ent.kind_of(fitted.entries[f.term]).linear]
+    tangents = fitted.tangents[sizes]
+    joint = np.concatenate([fitted.system.columns, tangents])
+    grams = Grams.of(joint, fitted.system.y, balance.block, balance.blocks)
+    wide = fitted.prior.extended(np.full(len(sizes), -np.inf), np.full(len(sizes), np.inf))
+    whole = np.concatenate([fitted.coefficients, np.zeros(len(sizes))])
+    _, without = left_out(grams, ~balance.reserved, wide, fitted.variance, whole)
+    free = tuple(fitted.free[k] for k in sizes)
+    return replace(fitted, tangents=tangents, free=free, without=without)
 
 
 def _at_bound(value: float, low: float, high: float) -> bool:
@@ -96,7 +119,8 @@ def _without(fitted: Fitted, at: int, span: slice) -> dict[str, Floats]:
         if free.term != at:
             continue
         values = free.get(fitted.terms) + fitted.without[:, size + k]
-        found[free.name] = np.exp(np.minimum(values, 700.0)) if free.log else values
+        plain = np.exp(np.minimum(values, 700.0)) if free.log else values
+        found[free.name] = np.clip(plain, free.low, free.high)
     return found
 
 

@@ -128,8 +128,11 @@ def _searched(
 
     def doubted(model: Fitted) -> bool:
         other = Fitter(objectives[1][0])
-        settle(other, model.terms)
-        return _left(other.balance, other.fit(model.terms)) < _left(balance, model)
+        left = []
+        for terms in (model.terms, model.terms[:-1]):
+            settle(other, terms)
+            left.append(_left(other.balance, other.fit(terms)))
+        return min(left) < _left(balance, model)
 
     doubt = doubted if len(objectives) > 1 else None
     found = search(fitter, with_offset(fitter, base), ends, say, seed, doubt)

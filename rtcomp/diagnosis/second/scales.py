@@ -1,8 +1,8 @@
 """What a recording offers to each unit: start values of the parameters of any effect.
 
 A length goes from the sensor's grain to the stroke, a speed over those of the motion, a voltage over those of
-the command, a time from a row to the length of the recording, a frequency to half the rate; periods and
-frequencies of waves come from periodograms of the residual.
+the command, a time from a row to the length of the recording, a frequency to the motion's bandwidth; periods
+and tones of waves come from periodograms of the residual.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ class Scales:
             (low, high),
             speed,
             np.unique(np.quantile(u[u > 0], quantiles)) if np.any(u > 0) else np.ones(1),
-            (data.period, 0.5 * data.seconds),
-            (4.0 / data.seconds, 0.4 * data.rate),
+            (data.period, data.seconds),
+            (4.0 / data.seconds, min(0.4 * data.rate, balance.noise.bandwidth)),
             float(np.sqrt(np.mean(as_force(balance, rest) ** 2))),
             _periods(balance, rest),
             _tones(balance, rest),
@@ -97,7 +97,7 @@ class Scales:
             "m/s": self.speed,
             "V": self.volts,
             "N": self.force * np.array([0.3, 1.0, 3.0]),
-            "s": np.geomspace(*self.time, POINTS + 1)[:-1],
+            "s": np.geomspace(*self.time, POINTS + 2)[1:],
             "Hz": np.geomspace(*self.frequency, 2 * POINTS),
         }.get(unit)
         return None if found is None else _listed(found)

@@ -99,6 +99,11 @@ class Signals:
         named = any(k.stands_for == number and k.searchable for k in catalogue.entries())
         return stated == 0.0 and self.stage.friction is not None and named
 
+    def damp_below(self, speed: float) -> None:
+        """Take `speed` (m/s) as that below which micro-damping acts, where the belief has none."""
+        self.stage = self.stage.with_changes(stage={"micro_damping_speed": speed})
+        self._cache = Cache()
+
     def _force_of(self, effect: Effect, segment: Segment, path: Path) -> Floats:
         """Return the force (N, (K,)) that the motion needs for an effect that adds one."""
         given = self._given(segment)
