@@ -268,7 +268,7 @@ def all_by_one_factor(numbers: Numbers) -> tuple[float, float] | None:
     some = numbers.before[forces] > 0
     before = numbers.before[forces][some]
     ratio, half = numbers.values[forces][some] / before, numbers.half[forces][some] / before
-    open_by = np.maximum(half, numbers.held[forces][some] / before)
+    open_by = np.maximum(np.maximum(half, numbers.held[forces][some] / before), 1e-9)
     factor = float(np.average(ratio, weights=open_by**-2.0))
     size = float(np.sqrt(1.0 / np.sum(open_by**-2.0)))
     clear = np.count_nonzero(np.abs(ratio - 1.0) > half)

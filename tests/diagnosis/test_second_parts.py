@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recorded import run, stage, there_and_back
+from recorded import cut, run, stage, there_and_back
 
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import ForceBalance
@@ -18,6 +18,7 @@ from rtcomp.diagnosis.second.candidates import Candidate
 from rtcomp.diagnosis.second.data import load_data
 from rtcomp.diagnosis.second.fit import Fitter, Term
 from rtcomp.diagnosis.second.regression import Grams
+from rtcomp.diagnosis.second.replicate import replicate
 from rtcomp.diagnosis.second.screening import Screen
 from rtcomp.diagnosis.second.significance import Null, confidence_set, log_gain, probabilities
 from rtcomp.diagnosis.second.spectrum import filtered, spectrum
@@ -26,6 +27,7 @@ from rtcomp.diagnosis.second.validation import Reserved
 from rtcomp.errors import RecordingError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, catalogue
+from rtcomp.stage.balance import between_rows
 
 FORMS = [
     (kind, form)
@@ -160,6 +162,52 @@ def test_a_judgement_needs_motion_in_the_reserved_blocks() -> None:
     assert balance.blocks == 10
     with pytest.raises(RecordingError, match="nothing moves in the part kept for the judgement"):
         Reserved(balance)
+
+
+def test_friction_remembers_the_way_to_a_window() -> None:
+    believed, whole = stage(), run(stage(), there_and_back(45.0))
+    balance = ForceBalance(believed, load_data([whole]))
+    windows, (everything,) = balance.data.segments, load_data([cut(whole, 0, 40_000)]).segments
+    assert len(windows) > 1 and everything.before is None
+    path = balance._path(everything, [])
+    along = balance._units(everything, path, [], [], None)
+    inside = [w for w in windows[1:] if w.time[-1] < everything.time[-1]]
+    assert inside
+    for window in inside:
+        first = round(float(window.time[0]) * 1000.0)
+        part = path.part(slice(first, first + window.time.size))
+        units = balance._units(window, part, [], [], None)
+        stops = slice(2 + balance.reaches.size // 2, None)  # short ones forget the way at once
+        assert units[10:-10, stops] == pytest.approx(
+            along[first + 10 : first + window.time.size - 10, stops], abs=0.02 * float(balance.reaches[-1])
+        )
+
+
+@given(st.lists(st.floats(-3.0, 3.0), min_size=4, max_size=4), st.floats(0.0, 1.0))
+@settings(max_examples=50, deadline=None)
+def test_between_rows_a_position_is_the_cubic_through_both(terms: list[float], share: float) -> None:
+    cubic = np.polynomial.Polynomial(terms)
+    time = np.arange(4) * 0.5
+    motion = np.column_stack([time, cubic(time), cubic.deriv()(time), np.zeros(4), np.zeros(4)])
+    assert between_rows(motion, 2, share) == pytest.approx(float(cubic(1.0 - 0.5 * share)), abs=1e-9)
+
+
+def test_a_replicate_of_averaged_rows_is_read_in_counts() -> None:
+    """At rest a reading stays at its count, however many rows are averaged."""
+    coarse = stage().with_changes(sensor={"noise": 1e-7, "resolution": 1e-6})
+    moving = there_and_back(20.0)
+    resting = np.where(np.arange(moving.size) % 10_000 < 4000, 0.0, moving)
+    data = load_data([run(coarse, resting)], bandwidth=12.0)
+    assert data.averaged > 1
+    made = replicate(coarse, data, [s.position for s in data.segments], 1e-7, seed=3)
+    assert made is not None
+    (segment,) = made.segments
+    assert segment.source is not None
+    counts = segment.source.position / 1e-6
+    assert counts == pytest.approx(np.round(counts), abs=1e-6)
+    assert segment.position == pytest.approx(
+        segment.source.position.reshape(-1, data.averaged).mean(axis=1), abs=1e-12
+    )
 
 
 def test_a_fit_is_blind_to_reserved_rows() -> None:

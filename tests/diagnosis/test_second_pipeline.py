@@ -55,6 +55,13 @@ def test_a_dead_zone_is_named_with_its_width(belief: Stage) -> None:
     assert found.fit.after < 0.1 * found.fit.before
 
 
+def test_a_slow_lag_of_friction_is_found_far_from_nothing() -> None:
+    hidden = stage(viscous=400.0, effects=[{"name": "frictional-lag", "time_constant": 0.15}])
+    found = diagnose(stage(viscous=400.0), [run(hidden, motion())], budget=300.0)
+    assert names(found)[0] == ("frictional-lag",)
+    assert found.effects[0].parameters["time_constant"].value == pytest.approx(0.15, rel=0.1)
+
+
 def test_two_effects_are_both_named() -> None:
     cogging = {"name": "cogging", "amplitude": 0.6, "period": 3e-4, "phase": 0.4}
     spring = {"name": "parallel-spring", "stiffness": 2000.0}
@@ -130,6 +137,28 @@ def test_a_band_limited_excitation_is_no_delay() -> None:
     assert names(found) == [("parallel-spring",)]
     assert found.effects[0].parameters["cubic"].value == pytest.approx(4e9, rel=0.05)
     assert any("band-limited" in note for note in found.notes)
+
+
+def test_a_held_command_in_open_loop_is_no_delay() -> None:
+    """Whatever is missing beside it: half a row of delay is what the wrong way between rows looks like."""
+    linear: dict[str, Any] = {"mass": 0.5, "force_constant": 1.0, "voltage_limit": 10.0, "viscous": 9.0}
+    linear["effects"] = [{"name": "parallel-spring", "stiffness": 2000.0}]
+    hidden = {"name": "resonance", "mass_ratio": 0.3, "frequency": 50.0, "damping": 0.03}
+    sensor = {"noise": 5e-9, "resolution": 1e-9}
+    axis = Stage.from_dict(
+        {"stage": {**linear, "effects": [*linear["effects"], hidden]}, "sensor": sensor, "rate": 1000.0}
+    )
+    simulator, drive = Simulator(axis, seed=1), 0.8 * multisine(20.0, 1000.0)
+    position = np.empty(drive.size)
+    for k, volts in enumerate(drive.tolist()):
+        position[k] = simulator.measure()
+        simulator.advance(volts, 1e-3)
+    columns = {"time": np.arange(drive.size) / 1000.0, "position": position, "voltage": drive}
+    belief = Stage.from_dict({"stage": linear, "sensor": sensor, "rate": 1000.0})
+    found = diagnose(belief, [Recording(columns, 1000.0, {}, Path("open.csv"))], budget=300.0)
+    assert names(found) == [("resonance",)]
+    assert found.effects[0].parameters["frequency"].value == pytest.approx(50.0, rel=0.03)
+    assert not any("band-limited" in note for note in found.notes)
 
 
 def test_a_budget_that_does_not_do_for_the_baseline_is_refused() -> None:

@@ -48,6 +48,10 @@ class Path:
     measured: Floats
     """Acceleration (m/s^2) of the position as measured, as the balance compares it."""
 
+    def part(self, rows: slice) -> Path:
+        """Return some of its rows."""
+        return Path(self.x[rows], self.v[rows], self.a[rows], self.measured[rows])
+
 
 class Signals:
     """What one stage makes of one set of recordings, row by row."""
