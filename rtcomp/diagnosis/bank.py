@@ -72,7 +72,8 @@ def units_along(
     after = [e for e in after if e.name != ClosingBranches.name]
     program = Program([*before, *units, *bent, *after])
     row = float((motion[-1, 0] - motion[0, 0]) / max(motion.shape[0] - 1, 1))
-    parts = max(parts_of([*before, *after], row), least_parts)
+    needed = parts_of([*before, *after], row)
+    parts = max(needed, least_parts)
     out = np.empty((motion.shape[0], SPEED_UNITS + len(reaches)))
     mean = np.zeros_like(out) if parts > 1 else out[:1]
     w = np.zeros(COUNT)
@@ -83,6 +84,8 @@ def units_along(
         program.steps, program.p, program.s, w, base, motion, parts, len(before), len(bent), weights, reaches,
         deflection, out, mean,
     )  # fmt: skip
+    if parts > needed == 1:  # damping is smooth between rows
+        mean[:, :SPEED_UNITS] = around_rows(out[:, :SPEED_UNITS])
     return around_rows(out) if parts == 1 else mean
 
 
@@ -159,7 +162,15 @@ def _along(
                 grown = w[FRICTION] / whole
                 for i in range(count):
                     held[i] *= grown
-            if parts > 1:
+            if parts == 2:  # a parabola through both ends and the middle, weighed by the triangle
+                for i in range(out.shape[1]):
+                    third = out[k, i] / 3.0
+                    mean[k, i] += third
+                    if j == 1 and k > 0:
+                        mean[k - 1, i] += third
+                    if j == 2 and k == end:
+                        mean[k, i] += third
+            elif parts > 1:
                 passed = (j - 0.5) / parts
                 for i in range(out.shape[1]):
                     share = 0.5 * (last[i] + out[k, i]) / parts

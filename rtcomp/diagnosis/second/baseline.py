@@ -28,7 +28,7 @@ def baseline(balance: ForceBalance) -> Fitted:
     sizes = [float(size) for entry in balance.believed for size in ent.sizes_of(entry)]
     balance.whiten(np.array([m.mass, m.viscous, m.micro_damping, *balance.weights, 0.0, *sizes]))
     fitter = Fitter(balance)
-    settle(fitter)
+    _put_grid(fitter, ())
     balance.whiten(fitter.fit([]).coefficients)
     settle(fitter)
     return fitter.fit([])
@@ -66,7 +66,13 @@ def with_offset(fitter: Fitter, fitted: Fitted) -> Fitted:
 
 
 def settle(fitter: Fitter, terms: Sequence[Term] = ()) -> None:
-    """Put the grid of yield displacements where a model of `terms` has friction, micro-damping likewise.
+    """Put friction's yield displacements and the speed of micro-damping to what a model of `terms` has."""
+    _put_grid(fitter, terms)
+    _damp(fitter, terms)
+
+
+def _put_grid(fitter: Fitter, terms: Sequence[Term]) -> None:
+    """Put the grid of yield displacements where a model of `terms` has friction.
 
     Stiffnesses that must not be negative come out sparse: of a dense grid, a dozen units are not zero. These
     are kept beside the believed ones and a coarse grid, so that candidates find friction that can give way.
@@ -86,7 +92,6 @@ def settle(fitter: Fitter, terms: Sequence[Term] = ()) -> None:
     skeleton = coarse[::2]
     far = np.array([not kept.size or np.min(np.abs(np.log(kept / r))) > step * FINER for r in skeleton])
     balance.put(np.concatenate([kept, skeleton[far]]), step * FINER)
-    _damp(fitter, terms)
 
 
 def _needed(balance: ForceBalance, fitted: Fitted) -> Floats:
