@@ -75,10 +75,12 @@ def in_si_units(
             why, readings = told
             first = readings[0]
             if not assume:
-                likely = " or ".join(f"{r.column} in {r.unit}" for r in readings)
+                likely = " or ".join(
+                    f"{r.column} in {r.unit} (multiply it by {r.factor:.4g})" for r in readings
+                )
                 raise RecordingError(
-                    f"{recording.path}: {why}; likely {likely}: multiply it by {_listed(readings)}, or "
-                    f"--assume-units to take {first.column} so"
+                    f"{recording.path}: {why}; likely {likely}; --assume-units takes {first.column} to be in "
+                    f"{first.unit}"
                 )
             recording = first.applied(recording)
             notes.append(f"{recording.path.name}: {first.column} is taken to be in {first.unit}: {why}")
@@ -103,10 +105,6 @@ def _one_axis(stage: Stage, recordings: Sequence[Recording]) -> None:
 
 def _mass_unit(stage: Stage) -> str:
     return "kg m^2" if stage.axis == "rotary" else "kg"
-
-
-def _listed(readings: Sequence[Reading]) -> str:
-    return " or ".join(f"{r.factor:.4g}" for r in readings)
 
 
 def _misread(stage: Stage, recording: Recording) -> tuple[str, list[Reading]] | None:
@@ -143,6 +141,7 @@ def _by_mass(stage: Stage) -> list[tuple[Reading, float]]:
     found += [(Reading(MASS, 1e-3, "g"), 1e-3), (Reading(MASS, 1e-6, "mg"), 1e-6)]
     found += [(Reading("voltage", 1e-3, "mV or mA"), 1e3), (Reading("position", 1e3, "km"), 1e3)]
     found += [(Reading("voltage", 1e-6, "uV or uA"), 1e6)]
+    found += [(Reading("voltage", 1e3, "kV or kA"), 1e-3), (Reading("voltage", 1e6, "MV or MA"), 1e-6)]
     return [*found, (Reading("time", 1e-3, "ms"), 1e6)]
 
 

@@ -24,7 +24,7 @@ from rtcomp.stage.stage import Stage
 NUMBERS = {"inertia", "viscous-friction", "micro-damping"}
 """Entries that are a number of the stage: they are not given beside it."""
 NEARLY = {
-    "backlash": 0.02,  # what is behind the play moves with what is believed, until it is settled
+    "backlash": 0.025,  # what is behind the play moves with what is believed, until it is settled
     "load-dependent-friction": 0.004,  # a fit goes by the friction that it begins with; `consistent` mends it
     "non-congruent-friction": 0.005,  # so does this, until it is settled
     "creep": 0.001,
