@@ -170,13 +170,13 @@ def test_friction_remembers_the_way_to_a_window() -> None:
     windows, (everything,) = balance.data.segments, load_data([cut(whole, 0, 40_000)]).segments
     assert len(windows) > 1 and everything.before is None
     path = balance._path(everything, [])
-    along = balance._units(everything, path, [], [], None)
+    along = balance._units(balance.stage, everything, path, [], [], None)
     inside = [w for w in windows[1:] if w.time[-1] < everything.time[-1]]
     assert inside
     for window in inside:
         first = round(float(window.time[0]) * 1000.0)
         part = path.part(slice(first, first + window.time.size))
-        units = balance._units(window, part, [], [], None)
+        units = balance._units(balance.stage, window, part, [], [], None)
         stops = slice(2 + balance.reaches.size // 2, None)  # short ones forget the way at once
         assert units[10:-10, stops] == pytest.approx(
             along[first + 10 : first + window.time.size - 10, stops], abs=0.02 * float(balance.reaches[-1])

@@ -93,7 +93,7 @@ def answer(
     return Diagnosis(
         verdict,
         where,
-        moved if verdict != "consistent" else [],
+        moved if matters else [],
         named,
         fit,
         [s.name for s in seen if not s.seen and s.name not in names],

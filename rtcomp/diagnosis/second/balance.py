@@ -79,6 +79,7 @@ class ForceBalance(Signals):
         other = ForceBalance(self.stage, data, self.noise)
         other.reaches, other.step, other.grain = self.reaches, self.step, self.grain
         other._whitening, other.blocks, other.block = self._whitening, self.blocks, self.block
+        other.believed_speed = self.believed_speed
         return other
 
     @property
@@ -89,8 +90,8 @@ class ForceBalance(Signals):
     def _needed(self, segment: Segment, c: Floats) -> Floats:
         """Return the force (N, (K,)) that a segment's motion needs, of coefficients `c` of the belief."""
         path = self._path(segment, [], smooth=False)
-        units = self._units(segment, path, [], [], None)
-        force = path.measured * c[0] + units @ c[1 : self.size - 1]
+        units = self._units(self.stage, segment, path, [], [], None)
+        force = path.measured * c[0] + units @ np.concatenate([c[1 : len(BASE)], c[self.friction]])
         made = [ent.build(one) for e in self.believed for one in ent.basis(e)]
         for effect, size in zip(made, c[self.size :], strict=True):
             force += size * self._force_of(effect, segment, path)

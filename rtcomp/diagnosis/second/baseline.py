@@ -16,6 +16,10 @@ DENSE = 64
 """Yield displacements that are tried at first, over the whole range."""
 SPEEDS = 9
 """Speeds below which micro-damping may act, where the belief has none."""
+STEPS = 4
+"""Times that a believed speed is moved to where a fit has it, at most."""
+SETTLED_SPEED = 2e-3
+"""Relative change of that speed at which it is settled."""
 FINER = 3
 """Times finer they stand around those found, in the second try."""
 SLIGHT = 1e-3
@@ -26,7 +30,7 @@ def baseline(balance: ForceBalance) -> Fitted:
     """Whiten `balance`, settle its grid of yield displacements, and return the refitted belief."""
     m = balance.stage.mechanics
     sizes = [float(size) for entry in balance.believed for size in ent.sizes_of(entry)]
-    balance.whiten(np.array([m.mass, m.viscous, m.micro_damping, *balance.weights, 0.0, *sizes]))
+    balance.whiten(np.array([m.mass, m.viscous, m.micro_damping, 0.0, *balance.weights, 0.0, *sizes]))
     fitter = Fitter(balance)
     _put_grid(fitter, ())
     balance.whiten(fitter.fit([]).coefficients)
@@ -35,20 +39,45 @@ def baseline(balance: ForceBalance) -> Fitted:
 
 
 def _damp(fitter: Fitter, terms: Sequence[Term]) -> None:
-    """Let micro-damping act below the speed that fits best, where the belief leaves it open."""
+    """Let micro-damping act below the speed that fits best: near the believed one, or any of the motion.
+
+    What friction does at low speed is steep in it: a few per cent off look like another effect.
+    """
     balance = fitter.balance
-    if balance.stage.mechanics.micro_damping > 0.0 or balance.without("micro_damping"):
+    if balance.without("micro_damping"):
         return
+    if balance.believed_speed is None:
+        _search_speed(fitter, terms)
+        return
+    found = None
+    for _ in range(STEPS):
+        found = fitter.fit(terms, found)
+        speed, before = balance.speed_of(found.coefficients), balance.stage.mechanics.micro_damping_speed
+        balance.damp_below(speed)
+        if abs(np.log(speed / before)) < SETTLED_SPEED:
+            return
+        terms = found.terms
+
+
+def _search_speed(fitter: Fitter, terms: Sequence[Term]) -> None:
+    from scipy.optimize import minimize_scalar
+
+    balance = fitter.balance
     v = np.abs(balance.plain([p.v for p in balance.paths()]))
     moving = v[v > 1e-3 * v.max()]
     if not moving.size:
         return
-    left: dict[float, float] = {}
-    slow, fast = (float(np.quantile(moving, q)) for q in (0.02, 0.9))
-    for speed in np.geomspace(slow, fast, SPEEDS).tolist():
-        balance.damp_below(speed)
-        left[speed] = fitter.fit(terms, steps=0).sse
-    balance.damp_below(min(left, key=lambda speed: left[speed]))
+
+    def left(log_speed: float) -> float:
+        balance.damp_below(float(np.exp(log_speed)))
+        return fitter.quick(terms)
+
+    slow, fast = (float(np.log(np.quantile(moving, q))) for q in (0.02, 0.9))
+    tried = np.linspace(slow, fast, SPEEDS)
+    at = int(np.argmin([left(one) for one in tried.tolist()]))
+    near = (tried[max(at - 1, 0)], tried[min(at + 1, SPEEDS - 1)])
+    best = minimize_scalar(left, bounds=near, method="bounded", options={"xatol": SETTLED_SPEED})
+    balance.damp_below(float(np.exp(best.x)))
 
 
 def with_offset(fitter: Fitter, fitted: Fitted) -> Fitted:

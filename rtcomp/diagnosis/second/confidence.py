@@ -59,7 +59,7 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         members |= {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
         plainest = min(models[k].size for k in members)
         members = {k for k in members if models[k].size == plainest} | {0}
-        weight = probabilities(errors, float(np.mean(np.bincount(fitter.balance.block))) / CELLS)
+        weight = probabilities(errors, _independent(fitter, chosen) / errors[0].size)
         order = sorted(members, key=lambda k: (-weight[k], k))
         names = [_replaced(models[k], chosen, i) for k in order]
         kept = [j for j, n in enumerate(names) if n not in names[:j]]
@@ -86,6 +86,17 @@ def _by_cell(fitter: Fitter, model: Fitted) -> Floats:
     used = fitter.use[block]
     found = np.bincount(cell[used], model.residual[used] ** 2, fitter.balance.blocks * CELLS)
     return np.asarray(found[np.bincount(cell[used], minlength=found.size) > 0] + 1e-300)
+
+
+def _independent(fitter: Fitter, model: Fitted) -> float:
+    """Return of how many independent rows the sum of squares of a model's residual tells as much.
+
+    n / (1 + 2 sum of rho_k^2) by the autocorrelation rho, here from its spectrum (Bayley and Hammersley 1946,
+    Suppl. J. R. Stat. Soc. 8(2)).
+    """
+    rest = model.residual[fitter.use[fitter.balance.block]]
+    power = np.abs(np.fft.rfft(rest)) ** 2
+    return float(min(2.0 * np.sum(power) ** 2 / max(float(np.sum(power**2)), 1e-300), rest.size))
 
 
 def _replaced(model: Fitted, chosen: Fitted, at: int) -> str:

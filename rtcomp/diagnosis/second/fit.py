@@ -149,6 +149,12 @@ class Fitter:
             elif balance.without(BASE[i]):
                 high[i] = 0.0
         low[0] = 1e-3 * m.mass
+        if balance.believed_speed is None:
+            high[balance.faster] = 0.0
+        else:
+            off = math.log(balance.believed_speed / m.micro_damping_speed)
+            mean[balance.faster], low[balance.faster] = m.micro_damping * off, -np.inf
+            precision[balance.faster] = (BELIEF_SD * m.micro_damping) ** -2
         if self.offset and not balance.biased and not any(ent.kind_of(t.entry).bias for t in terms):
             low[balance.size - 1] = -np.inf
         else:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rtcomp.diagnosis.bank import deflections, units_along
+from rtcomp.diagnosis.bank import SPEED_UNITS, deflections, units_along
 from rtcomp.diagnosis.path import Load, behind_play
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.cache import Cache, Group
@@ -31,7 +31,12 @@ GRID = 22
 MOST_OWN = 10
 """Believed yield displacements up to which they are taken into the grid as they are."""
 BASE = ("mass", "viscous", "micro_damping")
-"""Columns before those of the friction units."""
+"""Numbers whose columns come first. After them that of the speed of micro-damping, to first order, then
+those of the friction units, and a constant force."""
+FASTER = 0.02
+"""Relative change of the speed of micro-damping to which its damping is looked at."""
+FURTHEST = 0.3
+"""Largest change of its logarithm that is taken from one fit."""
 PARTS = 2
 """Parts of a row for friction: where it turns within one, the force at its ends is not that between."""
 MORE = 1e-3
@@ -73,6 +78,9 @@ class Signals:
         friction = stage.friction
         self._elements = list(friction.elements) if isinstance(friction, MaxwellSlip) else []
         self._cache = Cache()
+        m = stage.mechanics
+        self.believed_speed = m.micro_damping_speed if m.micro_damping > 0.0 else None
+        """Speed (m/s) below which micro-damping is believed to act, None where there is no such belief."""
 
     @property
     def believed_reaches(self) -> Floats:
@@ -81,18 +89,31 @@ class Signals:
 
     @property
     def size(self) -> int:
-        """Columns of the base: mass, damping, friction units, and last a constant force."""
-        return len(BASE) + self.reaches.size + 1
+        """Columns of the base: mass, damping and its speed, friction units, and last a constant force."""
+        return len(BASE) + 1 + self.reaches.size + 1
 
     @property
     def friction(self) -> slice:
         """Columns of the friction units, in the order of `reaches`."""
-        return slice(len(BASE), len(BASE) + self.reaches.size)
+        return slice(len(BASE) + 1, len(BASE) + 1 + self.reaches.size)
 
     @property
     def biased(self) -> bool:
         """Tell whether the belief has a constant force, which is refitted."""
         return any(ent.kind_of(e).bias for e in self.believed)
+
+    @property
+    def faster(self) -> int:
+        """Column of the speed of micro-damping: its coefficient is damping times the change of log speed."""
+        return len(BASE)
+
+    def speed_of(self, c: Floats) -> float:
+        """Return the speed (m/s) of micro-damping that coefficients `c` of the base tell."""
+        now, damping = self.stage.mechanics.micro_damping_speed, float(c[self.faster - 1])
+        if damping <= 0.0 or self.believed_speed is None:
+            return now
+        change = float(np.clip(c[self.faster] / damping, -FURTHEST, FURTHEST))
+        return now * float(np.exp(change))
 
     def without(self, number: str) -> bool:
         """Tell whether the belief denies a number of the base: it has friction, but none of this kind.
@@ -104,9 +125,8 @@ class Signals:
         return stated == 0.0 and self.stage.friction is not None and named
 
     def damp_below(self, speed: float) -> None:
-        """Take `speed` (m/s) as that below which micro-damping acts, where the belief has none."""
+        """Take `speed` (m/s) as that below which micro-damping acts."""
         self.stage = self.stage.with_changes(stage={"micro_damping_speed": speed})
-        self._cache = Cache()
 
     def _force_of(self, effect: Effect, segment: Segment, path: Path) -> Floats:
         """Return the force (N, (K,)) that the motion needs for an effect that adds one."""
@@ -159,9 +179,9 @@ class Signals:
         adding: Sequence[Effect],
         weights: Floats | None,
     ) -> tuple[list[Group], Group | None]:
-        """Return the base's columns (mass; damping and friction units; a constant force), and the load's.
+        """Return the base's columns (mass; damping; its speed; friction units; a constant force), the load's.
 
-        The latter is how much the friction at hand changes with the command, relative to it.
+        The last is how much the friction at hand changes with the command, relative to it.
         """
         whole = any(e.whole_friction for e in modifiers)
         play = next((e for e in bodies if e.behind and _active(e)), None)
@@ -190,7 +210,9 @@ class Signals:
                 found.append(a)
             return found
 
-        def units(more: float = 0.0, some: np.ndarray | None = None) -> list[Floats]:
+        def units(
+            more: float = 0.0, some: np.ndarray | None = None, stage: Stage = self.stage
+        ) -> list[Floats]:
             found = []
             for k, (s, p) in enumerate(zip(self.data.segments, self.paths(sensors), strict=True)):
                 path = p
@@ -199,29 +221,41 @@ class Signals:
                     v = np.gradient(y, self.data.period)
                     path = Path(y, v, _second_difference(y, self.data.rate), p.measured)
                 pushed = replace(s, voltage=(1.0 + more) * s.voltage) if more else s
-                found.append(self._units(pushed, path, before, modifiers, weights if whole else None, some))
+                at_hand = weights if whole else None
+                found.append(self._units(stage, pushed, path, before, modifiers, at_hand, some))
             return found
 
+        def damping() -> list[Floats]:
+            present = held != 0.0 if whole else np.zeros(held.size, dtype=np.bool_)
+            pairs = zip(units(some=present), units(some=present, stage=self._damping_below()), strict=True)
+            last = SPEED_UNITS - 1
+            return [
+                np.column_stack([now[:, :SPEED_UNITS], (then[:, last] - now[:, last]) / np.log1p(FASTER)])
+                for now, then in pairs
+            ]
+
+        def friction(more: float = 0.0) -> list[Floats]:
+            return [table[:, SPEED_UNITS:] for table in units(more)]
+
         def of_sizes(sizes: Floats) -> list[Floats]:
-            held = weights if whole and weights is not None else self.weights
-            some = (sizes[len(BASE) - 1 :] != 0.0) | (held != 0.0)
-            kept = np.concatenate([sizes[: len(BASE) - 1], sizes[len(BASE) - 1 :][some]])
-            return [table @ kept for table in units(some=some)]
+            some = sizes != 0.0
+            if whole:
+                some |= held != 0.0
+            return [table[:, SPEED_UNITS:] @ sizes[some] for table in units(some=some)]
 
         def by_load() -> list[Floats]:
-            held = self.weights if weights is None else weights
-            first = len(BASE) - 1
-            pairs = zip(units(MORE), units(), strict=True)
-            return [(more[:, first:] - plain[:, first:]) @ held / MORE for more, plain in pairs]
+            pairs = zip(friction(MORE), friction(), strict=True)
+            return [(more - plain) @ held / MORE for more, plain in pairs]
 
+        held = self.weights if weights is None else weights
         key = (key_of(before), key_of(modifiers), key_of(sensors), behind, own)
         columns = [
             Group(("mass", key_of(hung), key_of(sensors), behind), mass),
-            Group(("units", *key), units, of_sizes, len(BASE) - 1 + self.reaches.size),
+            Group(("damping", self.stage.mechanics.micro_damping_speed, *key), damping),
+            Group(("friction", *key), friction, of_sizes, self.reaches.size),
             Group(("offset",), lambda: [np.ones(s.time.size) for s in self.data.segments]),
         ]
-        held = (weights if weights is not None else self.weights).tobytes()
-        return columns, Group(("by load", held, *key), by_load) if before else None
+        return columns, Group(("by load", held.tobytes(), *key), by_load) if before else None
 
     def _load(self, sensors: Sequence[Effect], play: Effect, weights: Floats | None) -> list[Floats]:
         """Return the position (m) of the load behind a play along each segment."""
@@ -243,8 +277,13 @@ class Signals:
             found[at] += k * r / self.reaches[at]
         return found
 
+    def _damping_below(self) -> Stage:
+        speed = (1.0 + FASTER) * self.stage.mechanics.micro_damping_speed
+        return self.stage.with_changes(stage={"micro_damping_speed": speed})
+
     def _units(
         self,
+        stage: Stage,
         segment: Segment,
         path: Path,
         before: Sequence[Effect],
@@ -259,7 +298,7 @@ class Signals:
         if some is not None:
             held, reaches, start = held[some], reaches[some], start[some]
         return units_along(
-            self.stage, list(before), list(modifiers), reaches, held, np.ascontiguousarray(motion),
+            stage, list(before), list(modifiers), reaches, held, np.ascontiguousarray(motion),
             self.grain, start, PARTS,
         )  # fmt: skip
 
@@ -300,8 +339,7 @@ def _grid(stage: Stage, data: Data, grain: float) -> Floats:
     shortest = max(2.0 * grain, 1e-5 * longest)
     friction = stage.friction
     if isinstance(friction, MaxwellSlip):
-        first = min(r for _, r in friction.elements)
-        shortest = min(max(0.3 * first, shortest), first)
+        shortest = min(shortest, *(r for _, r in friction.elements))
     return np.geomspace(min(shortest, 0.5 * longest), longest, GRID)
 
 

@@ -30,6 +30,7 @@ def stage_of(balance: ForceBalance, fitted: Fitted, *, between: bool = False) ->
     mechanics: dict[str, Any] = data["stage"]
     for key, value in zip(BASE, c, strict=False):
         mechanics[key] = float(max(value, 0.0))
+    mechanics["micro_damping_speed"] = balance.speed_of(c)
     stiffness, reaches = c[balance.friction], balance.reaches
     if between:
         stiffness, reaches = _between(balance, stiffness)
