@@ -45,18 +45,25 @@ class Alternatives:
 
 
 def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternatives]:
-    """Return the chosen effects, each with its set; stops looking at the time `ends`."""
-    chosen = found.chosen
-    done = []
-    for i, term in enumerate(chosen.terms):
+    """Return the chosen effects, each with its set; stops looking at the time `ends`.
+
+    Where a plainer model cannot be told from the chosen one, that one is chosen from then on.
+    """
+    done: list[Alternatives] = []
+    while len(done) < len(found.chosen.terms):
+        chosen, i = found.chosen, len(done)
         rest = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
-        others = _others(fitter, found, i, rest, ends)
-        models = [chosen, *others]
+        models = [chosen, *_others(fitter, found, i, rest, ends)]
         errors = [_by_cell(fitter, m) for m in models]
-        members = set(confidence_set(errors, SET_LEVEL))
+        alike = confidence_set(errors, SET_LEVEL)
+        plainer = min(alike, key=lambda k: models[k].size)
+        if models[plainer].size < chosen.size:
+            found.alternatives = [m for m in found.alternatives if m is not models[plainer]] + [chosen]
+            found.chosen, found.beside, done = models[plainer], None, []
+            continue
         best_gain = log_gain(rest.errors, chosen.errors)
         least = (1.0 - ALIAS) * best_gain
-        members |= {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
+        members = {*alike, *(k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least)}
         plainest = min(models[k].size for k in members)
         members = {k for k in members if models[k].size == plainest} | {0}
         weight = probabilities(errors, _independent(fitter, chosen) / errors[0].size)
@@ -66,7 +73,7 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         gain = 1.0 - float(chosen.errors.sum() / rest.errors.sum())
         done.append(
             Alternatives(
-                term,
+                chosen.terms[i],
                 tuple(names[j] for j in kept),
                 float(min(sum(weight[k] for k in order), 1.0)),
                 gain,
