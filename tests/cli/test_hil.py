@@ -29,6 +29,7 @@ def verdicts(text: str) -> dict[tuple[str, str], dict[str, object]]:
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_serial_from_end_to_end(tmp_path: Path) -> None:
     run = rtcomp(
         "hil", shipped("leuven.yaml"), "--link", "serial", "--seconds", "3", "--fault", "kill",
@@ -73,6 +74,7 @@ def test_a_verdict_that_does_not_hold_is_status_1(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_the_three_links_and_every_fault(tmp_path: Path) -> None:
     """At 1 kHz, 10 s a run: twenty times less error, one model, every fault's reaction."""
     run = rtcomp(

@@ -68,6 +68,7 @@ def test_what_cannot_be_used_is_one_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_the_whole_study_takes_under_two_minutes(tmp_path: Path) -> None:
     run = rtcomp("paper", "--json", "--out", "out", at=tmp_path, timeout=240.0)
     assert run.returncode == 0, run.stderr

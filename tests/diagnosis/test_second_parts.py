@@ -20,6 +20,7 @@ from rtcomp.diagnosis.second.fit import Fitter, Term
 from rtcomp.diagnosis.second.regression import Grams
 from rtcomp.diagnosis.second.replicate import replicate
 from rtcomp.diagnosis.second.screening import Screen
+from rtcomp.diagnosis.second.selection import Search, doubts
 from rtcomp.diagnosis.second.significance import Null, confidence_set, log_gain, probabilities
 from rtcomp.diagnosis.second.spectrum import filtered, spectrum
 from rtcomp.diagnosis.second.stage_of import stage_of
@@ -244,3 +245,16 @@ def test_friction_that_nobody_believes_is_found_to_the_noise() -> None:
     whole = float(known.power), float(open_to_all.power)
     assert found.sse / whole[1] < 4.0 * right.sse / whole[0] + 1e-4
     assert found.coefficients[0] == pytest.approx(2.0, rel=0.03)
+
+
+@pytest.mark.parametrize(("bump", "said"), [(0.0, ""), (1.5, "more is left than it explains")])
+def test_an_effect_is_doubted_where_more_is_left_than_it_explains(bump: float, said: str) -> None:
+    wave = {"name": "cogging", "amplitude": 0.2, "period": 3e-4, "phase": 0.4}
+    knots = [-1e-3, 1e-4, 1.3e-4, 1.6e-4, 1e-3]
+    body = {"name": "position-force", "knots": knots, "values": [0.0, 0.0, bump, 0.0, 0.0]}
+    truth = stage(effects=[wave, body] if bump else [wave])
+    balance = ForceBalance(stage(), load_data([run(truth, there_and_back(20.0))]))
+    base, fitter = baseline(balance), Fitter(balance)
+    chosen = fitter.fit([Term.of(wave)], base)
+    noise = Null(np.ones(19), chosen.errors.size * np.linspace(0.9, 1.1, 19))
+    assert doubts(fitter, Search(base, chosen, noise)) == [said]

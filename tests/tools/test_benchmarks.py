@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.realtime
 TOP = Path(__file__).resolve().parents[2]
 BENCHMARKS = sorted(path.name for path in (TOP / "tools").glob("bench_*.py"))
 
@@ -176,7 +177,6 @@ def test_endurance_in_short(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.realtime
 def test_the_serial_link(tmp_path: Path) -> None:
     for _ in range(3):
         try:

@@ -33,11 +33,6 @@ class Told:
     bound: tuple[str, ...]
     """Parameters that are at a physical bound."""
 
-    @property
-    def solid(self) -> bool:
-        """Tell whether it may be named."""
-        return not self.nothing and not self.bound
-
 
 def told(balance: ForceBalance, fitted: Fitted) -> list[Told]:
     """Return the 95 % intervals of each term's parameters.

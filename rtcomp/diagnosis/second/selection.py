@@ -116,17 +116,35 @@ def search(
 
 
 def _solid(fitter: Fitter, found: Search) -> None:
-    """Leave out effects whose size may be nothing or is at a bound, and refit the others."""
+    """Leave out effects that are no finding, and refit the others."""
     while found.chosen.terms:
-        spans = told(fitter.balance, found.chosen)
-        weak = [i for i, span in enumerate(spans) if not span.solid]
+        weak = [(i, why) for i, why in enumerate(doubts(fitter, found)) if why]
         if not weak:
             return
-        name, span = ent.names(found.chosen.entries)[weak[-1]], spans[weak[-1]]
-        why = f"{', '.join(span.bound)} at its bound" if span.bound else "its size may be nothing"
-        found.dropped.append(f"{name} is not named: {why}")
-        kept = [t for i, t in enumerate(found.chosen.terms) if i != weak[-1]]
+        at, why = weak[-1]
+        found.dropped.append(f"{ent.names(found.chosen.entries)[at]} is not named: {why}")
+        kept = [t for i, t in enumerate(found.chosen.terms) if i != at]
         found.chosen, found.alternatives, found.beside = fitter.fit(kept, found.chosen), [], None
+
+
+def doubts(fitter: Fitter, found: Search) -> list[str]:
+    """Return why each effect of the chosen model is no finding, "" where it is one.
+
+    Its size may be nothing, a number of it is at a physical bound, or more is left than it explains: what
+    else makes the rest makes that part as well, more likely than not.
+    """
+    chosen, null = found.chosen, found.null
+    said = []
+    for i, span in enumerate(told(fitter.balance, chosen)):
+        why = "its size may be nothing" if span.nothing else ""
+        why = f"{', '.join(span.bound)} at its bound" if span.bound else why
+        error = float(chosen.errors.sum())
+        if not why and null is not None and null.p_of_error(error) < LEVEL:
+            without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
+            explained = float(without.errors.sum()) - error
+            why = "more is left than it explains" if error - np.median(null.errors) > explained else ""
+        said.append(why)
+    return said
 
 
 def _resettled(
@@ -294,4 +312,4 @@ def _table(
     ]
 
 
-__all__ = ["Search", "Term", "search"]
+__all__ = ["Search", "Term", "doubts", "search"]
