@@ -193,7 +193,10 @@ def _apart(knob: Knob, one: float, other: float) -> float:
 
 @dataclass(frozen=True)
 class Numbers:
-    """Mass, viscous friction, micro-damping, level and reach of friction, believed and found, (5,) each."""
+    """Mass, viscous friction, micro-damping, level and reach of friction, believed and found, (5,) each.
+
+    Sizes of forces of believed effects may follow.
+    """
 
     before: Floats
     values: Floats
@@ -264,7 +267,7 @@ def all_by_one_factor(numbers: Numbers) -> tuple[float, float] | None:
     No recording of voltage and position tells such numbers from another force constant, which is one number
     and not four.
     """
-    forces = slice(0, 4)  # a reach is no force
+    forces = np.flatnonzero(np.arange(numbers.before.size) != 4)  # a reach is no force
     some = numbers.before[forces] > 0
     before = numbers.before[forces][some]
     ratio, half = numbers.values[forces][some] / before, numbers.half[forces][some] / before

@@ -170,3 +170,13 @@ def test_a_short_budget_gives_the_best_answer_so_far_and_says_what_was_not_tried
     effects = [{"name": "drive-deadband", "width": 0.3}, {"name": "parallel-spring", "stiffness": 2000.0}]
     found = diagnose(stage(), [run(stage(effects=effects), motion())], budget=2.0)
     assert any(note.startswith("not tried within 2 s") for note in found.notes)
+
+
+def test_another_force_constant_is_one_number_beside_a_believed_spring_too() -> None:
+    spring = {"name": "parallel-spring", "stiffness": 2000.0}
+    found = answer(stage(force_constant=4.4, effects=[spring]), spring)
+    assert found.verdict == "retuned" and [m.parameter for m in found.retuned] == ["force_constant"]
+    assert found.retuned[0].after.low <= 4.0 <= found.retuned[0].after.high
+    told = found.stage.to_dict()["stage"]
+    assert told["effects"][0]["stiffness"] == pytest.approx(2000.0, rel=0.01)
+    assert told["mass"] == pytest.approx(2.0, rel=0.01)

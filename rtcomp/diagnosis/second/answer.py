@@ -11,7 +11,6 @@ import numpy as np
 from rtcomp.diagnosis.certain import Numbers, all_by_one_factor, force_constant, retunings
 from rtcomp.diagnosis.curves import left_over
 from rtcomp.diagnosis.experiment import next_experiment
-from rtcomp.diagnosis.extend import with_forces
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
 from rtcomp.diagnosis.second import entries as ent
@@ -22,7 +21,7 @@ from rtcomp.diagnosis.second.fit import Fitted, Fitter
 from rtcomp.diagnosis.second.intervals import Told, numbers, told
 from rtcomp.diagnosis.second.selection import Search
 from rtcomp.diagnosis.second.settings import LEAST_GAIN, LEFT, LEVEL, TOLERANCE
-from rtcomp.diagnosis.second.stage_of import stage_of
+from rtcomp.diagnosis.second.stage_of import stage_of, with_forces
 from rtcomp.diagnosis.second.validation import Reserved
 from rtcomp.diagnosis.second.where import Compared, above_noise, as_force, curves
 from rtcomp.errors import ConfigError, RtcompError
@@ -152,7 +151,11 @@ def _stages(
     """Return the retuned and the extended stage, and the numbers of the belief that moved."""
     stages = {"retuned": stage_of(balance, base), "after": stage_of(balance, final)}
     moved = retunings(tuned, believed.axis)
-    factor = None if named or believed.mechanics.effects else all_by_one_factor(tuned)
+    # Forces whose size is no number of the model cannot have moved with the others.
+    fixed = any(
+        ent.adds_force(ent.kind_of(e)) and not ent.kind_of(e).linear for e in believed.mechanics.effects
+    )
+    factor = None if named or fixed else all_by_one_factor(numbers(balance, believed, final, effects=True))
     if factor is not None:
         stages = {name: with_forces(stage, 1.0 / factor[0]) for name, stage in stages.items()}
         moved = [force_constant(believed, *factor)]

@@ -140,15 +140,21 @@ def _once(balance: ForceBalance, fitted: Fitted, at: int, span: slice) -> dict[s
     return found
 
 
-def numbers(balance: ForceBalance, believed: Stage, fitted: Fitted) -> Numbers:
-    """Return mass, damping, level and reach of friction, believed and found, with their half widths."""
+def numbers(balance: ForceBalance, believed: Stage, fitted: Fitted, *, effects: bool = False) -> Numbers:
+    """Return mass, damping, level and reach of friction, believed and found, with their half widths.
+
+    With `effects`, the sizes of forces that believed effects add as well, by amount.
+    """
     from scipy.stats import t as student
 
     reaches = balance.reaches
+    sizes = np.concatenate([np.zeros(0), *(ent.sizes_of(e) for e in balance.believed if effects)])
+    own = slice(balance.size, balance.size + sizes.size)
+    sign = np.where(sizes < 0.0, -1.0, 1.0)
 
     def of(c: Floats) -> Floats:
         elements = list(zip(c[balance.friction], reaches, strict=True))
-        return np.array([*c[: len(BASE)], *level_and_reach(elements)])
+        return np.array([*c[: len(BASE)], *level_and_reach(elements), *(sign * c[own])])
 
     values = of(fitted.coefficients)
     sets = np.array([of(c) for c in fitted.without])
@@ -156,7 +162,7 @@ def numbers(balance: ForceBalance, believed: Stage, fitted: Fitted) -> Numbers:
     factor = float(student.ppf(0.975, max(sets.shape[0] - 1, 1)))
     half = np.sqrt(factor**2 * spread + (MODEL * values) ** 2)
     m = believed.mechanics
-    before = np.array([m.mass, m.viscous, m.micro_damping, *_friction(believed)])
+    before = np.array([m.mass, m.viscous, m.micro_damping, *_friction(believed), *(sign * sizes)])
     return Numbers(before, values, half, np.zeros(values.size))
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rtcomp.diagnosis.extend import with_forces as scaled
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import BASE, ForceBalance
 from rtcomp.diagnosis.second.entries import Entry
@@ -59,6 +60,18 @@ def stage_of(balance: ForceBalance, fitted: Fitted, *, between: bool = False) ->
     if not effects:
         del mechanics["effects"]
     return Stage.from_dict(data)
+
+
+def with_forces(stage: Stage, factor: float) -> Stage:
+    """Return a stage that moves as `stage` does, all its forces and the drive's times `factor`."""
+    changed = scaled(stage, factor).to_dict()
+    effects = [dict(e) for e in changed["stage"].get("effects", [])]
+    if effects:
+        changed["stage"]["effects"] = [
+            ent.composed(e, factor * ent.sizes_of(e)) if ent.adds_force(ent.kind_of(e)) else e
+            for e in effects
+        ]
+    return Stage.from_dict(changed)
 
 
 def bias_entry(force: float) -> Entry:
