@@ -34,8 +34,8 @@ class Alternatives:
 
     term: Term
     names: tuple[str, ...]
-    """All that cannot be told apart and is as plain, likeliest first: what has more parameters and gains
-    nothing by them is no other explanation."""
+    """All that cannot be told apart, likeliest first: what has more parameters and is no likelier by them is
+    no other explanation."""
     probability: float
     """That the truth is among them, if it is among all that was fitted."""
     gain: float
@@ -47,7 +47,7 @@ class Alternatives:
 def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternatives]:
     """Return the chosen effects, each with its set; stops looking at the time `ends`.
 
-    Where a plainer model cannot be told from the chosen one, that one is chosen from then on.
+    Where a plainer model that is likelier cannot be told from the chosen one, it is chosen from then on.
     """
     done: list[Alternatives] = []
     while len(done) < len(found.chosen.terms):
@@ -55,9 +55,10 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         rest = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
         models = [chosen, *_others(fitter, found, i, rest, ends)]
         errors = [_by_cell(fitter, m) for m in models]
+        weight = probabilities(errors, _independent(fitter, chosen) / errors[0].size)
         alike = confidence_set(errors, SET_LEVEL)
-        plainer = min(alike, key=lambda k: models[k].size)
-        if models[plainer].size < chosen.size:
+        plainer = min(alike, key=lambda k: (models[k].size, -weight[k]))
+        if models[plainer].size < chosen.size and weight[plainer] > weight[0]:
             found.alternatives = [m for m in found.alternatives if m is not models[plainer]] + [chosen]
             found.chosen, found.beside, done = models[plainer], None, []
             continue
@@ -65,8 +66,8 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         least = (1.0 - ALIAS) * best_gain
         members = {*alike, *(k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least)}
         plainest = min(models[k].size for k in members)
-        members = {k for k in members if models[k].size == plainest} | {0}
-        weight = probabilities(errors, _independent(fitter, chosen) / errors[0].size)
+        enough = max(weight[k] for k in members if models[k].size == plainest)
+        members = {k for k in members if models[k].size == plainest or weight[k] > enough} | {0}
         order = sorted(members, key=lambda k: (-weight[k], k))
         names = [_replaced(models[k], chosen, i) for k in order]
         kept = [j for j, n in enumerate(names) if n not in names[:j]]

@@ -19,7 +19,7 @@ from rtcomp.diagnosis.second.replicates import best, free_columns, null_of
 from rtcomp.diagnosis.second.screening import Screen, Screened
 from rtcomp.diagnosis.second.settings import BEAM, FULL_FITS, LEAST_GAIN, LEVEL, MOST_EFFECTS, NEGLIGIBLE
 from rtcomp.diagnosis.second.significance import Null, log_gain
-from rtcomp.diagnosis.second.where import relative_error
+from rtcomp.diagnosis.second.where import above_noise, relative_error
 from rtcomp.errors import ConfigError
 
 SCANNED = 14
@@ -138,11 +138,11 @@ def doubts(fitter: Fitter, found: Search) -> list[str]:
     for i, span in enumerate(told(fitter.balance, chosen)):
         why = "its size may be nothing" if span.nothing else ""
         why = f"{', '.join(span.bound)} at its bound" if span.bound else why
-        error = float(chosen.errors.sum())
-        if not why and null is not None and null.p_of_error(error) < LEVEL:
+        if not why and null is not None and null.p_of_error(float(chosen.errors.sum())) < LEVEL:
             without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
-            explained = float(without.errors.sum()) - error
-            why = "more is left than it explains" if error - np.median(null.errors) > explained else ""
+            left = above_noise(fitter.balance, chosen) ** 2
+            explained = above_noise(fitter.balance, without) ** 2 - left
+            why = "more is left than it explains" if left > explained else ""
         said.append(why)
     return said
 
