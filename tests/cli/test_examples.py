@@ -23,16 +23,8 @@ from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.recording.reader import load
 
 PROJECT = Path(__file__).resolve().parents[2]
-SLOW = (
-    "--serial",
-    "--port",
-    "rtcomp trial",
-    "rtcomp hil",
-    "demo --seed",
-    "rtcomp paper",
-    "bench loop",
-    "bench link",
-)
+REAL_TIME = ("--serial", "--port", "rtcomp hil", "bench loop", "bench link")
+SLOW = (*REAL_TIME, "rtcomp trial", "demo --seed", "rtcomp paper")
 PATIENCE = 4
 """Times that an example over a port is tried on a machine that is busy with something else."""
 ONCE = ("demo", "diagnose", "trial", "hil", "paper")
@@ -115,13 +107,14 @@ def ready(folder: Path, example: str) -> list[str]:
     return words
 
 
+def marks(line: str) -> list[pytest.MarkDecorator]:
+    slow, real_time = (any(w in line for w in words) for words in (SLOW, REAL_TIME))
+    return [pytest.mark.slow] * slow + [pytest.mark.realtime] * real_time
+
+
 @pytest.mark.parametrize(
     "example",
-    [
-        pytest.param(line, id=line, marks=pytest.mark.slow if any(w in line for w in SLOW) else ())
-        for line in EXAMPLES
-        if "plant serve" not in line
-    ],
+    [pytest.param(line, id=line, marks=marks(line)) for line in EXAMPLES if "plant serve" not in line],
 )
 def test_an_example_runs_as_it_stands(folder: Path, example: str) -> None:
     words = ready(folder, example)
