@@ -16,7 +16,8 @@ from rtcomp.diagnosis.second.balance import ForceBalance
 from rtcomp.diagnosis.second.baseline import baseline
 from rtcomp.diagnosis.second.candidates import Candidate
 from rtcomp.diagnosis.second.data import load_data
-from rtcomp.diagnosis.second.fit import Fitter, Term
+from rtcomp.diagnosis.second.fit import Fitter
+from rtcomp.diagnosis.second.free import Term
 from rtcomp.diagnosis.second.regression import Grams
 from rtcomp.diagnosis.second.replicate import replicate
 from rtcomp.diagnosis.second.screening import Screen

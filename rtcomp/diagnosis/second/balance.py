@@ -20,8 +20,9 @@ from rtcomp.diagnosis.second.cache import Cache, Group
 from rtcomp.diagnosis.second.data import Data, Segment, reversals
 from rtcomp.diagnosis.second.entries import Entry
 from rtcomp.diagnosis.second.noise import Noise, Whitening
+from rtcomp.diagnosis.second.reaches import MOST_OWN, joined
 from rtcomp.diagnosis.second.settings import BLOCK_REVERSALS, BLOCK_SECONDS, RESERVED_EVERY
-from rtcomp.diagnosis.second.signals import BASE, MOST_OWN, Signals, joined, key_of
+from rtcomp.diagnosis.second.signals import BASE, Signals, key_of
 from rtcomp.diagnosis.second.spectrum import filtered
 from rtcomp.kernels import Floats
 from rtcomp.physics import Place

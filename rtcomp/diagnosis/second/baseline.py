@@ -8,7 +8,8 @@ import numpy as np
 
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import ForceBalance
-from rtcomp.diagnosis.second.fit import Fitted, Fitter, Term
+from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.diagnosis.second.free import Term
 from rtcomp.diagnosis.second.settings import LEAST_GAIN
 from rtcomp.kernels import Floats
 

@@ -16,7 +16,8 @@ from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import BASE, ForceBalance
 from rtcomp.diagnosis.second.entries import Entry
-from rtcomp.diagnosis.second.fit import Fitted, Term
+from rtcomp.diagnosis.second.fit import Fitted
+from rtcomp.diagnosis.second.free import Term
 from rtcomp.diagnosis.second.scales import Scales
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats

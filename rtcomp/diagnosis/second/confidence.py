@@ -11,7 +11,8 @@ import numpy as np
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.candidates import candidates, started
-from rtcomp.diagnosis.second.fit import Fitted, Fitter, Term
+from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.diagnosis.second.free import Term
 from rtcomp.diagnosis.second.replicates import best, free_columns
 from rtcomp.diagnosis.second.screening import Screen
 from rtcomp.diagnosis.second.selection import Search

@@ -17,6 +17,7 @@ from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import BASE, ForceBalance, System
 from rtcomp.diagnosis.second.entries import Entry
+from rtcomp.diagnosis.second.free import Free, Term, free_of
 from rtcomp.diagnosis.second.regression import Grams, Prior
 from rtcomp.diagnosis.second.settings import BELIEF_SD
 from rtcomp.errors import ConfigError
@@ -24,61 +25,10 @@ from rtcomp.kernels import Floats
 
 STEPS = 10
 """Gauss-Newton steps at most."""
-LONGEST = 1.25
-"""Longest period of a wave, relative to the stroke."""
 SETTLED = 1e-4
 """Relative gain of a step below which the fit ends."""
-AT_BOUND = 1e-3
-"""Part of a number by which it may be away from its bound and still be at it."""
 ONCE = 0.5
 """Part of a column's power in one block, from which on the other blocks cannot tell its size."""
-
-
-@dataclass(frozen=True)
-class Term:
-    """An entry in a model, and the names of its parameters that a fit moves."""
-
-    entry: Entry
-    free: frozenset[str]
-
-    @classmethod
-    def of(cls, entry: Entry) -> Term:
-        """Take all parameters that the entry states to be free."""
-        own = [*ent.free_parameters(entry, linear=True), *ent.free_parameters(entry, linear=False)]
-        return cls(entry, frozenset(p.name for p in own))
-
-    def with_entry(self, entry: Entry) -> Term:
-        """Return the term with other values."""
-        return Term(entry, self.free)
-
-
-@dataclass(frozen=True)
-class Free:
-    """A nonlinear parameter: the term and its name, how it is scaled, and its derivative's step."""
-
-    term: int
-    name: str
-    low: float
-    high: float
-    log: bool
-    step: float
-
-    def get(self, terms: Sequence[Term]) -> float:
-        """Return its value on the scale it is moved on."""
-        value = float(terms[self.term].entry[self.name])
-        return math.log(value) if self.log else value
-
-    def at_bound(self, terms: Sequence[Term]) -> bool:
-        """Tell whether it is as large or as small as it may be."""
-        value = float(terms[self.term].entry[self.name])
-        near = AT_BOUND * abs(value)
-        return value >= self.high - near or 0.0 < self.low >= value - near
-
-    def put(self, terms: list[Term], value: float) -> None:
-        """Give it a value on that scale, within its bounds."""
-        plain = math.exp(value) if self.log else value
-        entry = {**terms[self.term].entry, self.name: min(max(plain, self.low), self.high)}
-        terms[self.term] = terms[self.term].with_entry(entry)
 
 
 @dataclass(frozen=True)
@@ -202,7 +152,7 @@ class Fitter:
             system, prior, _, c, sse = self.solve(current, weights, variance)
             variance = sse / max(int(rows.sum()), 1)
             weights = c[b.friction]
-        free = self._free(current)
+        free = free_of(current, b)
         damping = 1e-3
         tangents = np.zeros((0, system.y.size))
         for _ in range(steps if free else 0):
@@ -235,7 +185,7 @@ class Fitter:
             weights = c[b.friction]
             variance = sse / max(int(rows.sum()), 1)
             damping = max(0.1 * damping, 1e-6)
-            free = self._free(current)
+            free = free_of(current, b)
             if gained < SETTLED:
                 break
         return self._finished(current, free, system, prior, c, sse, variance, weights)
@@ -266,34 +216,6 @@ class Fitter:
             tuple(done), c, system, prior, residual, tangents, tuple(free), errors, without, sse, variance,
             weights,
         )  # fmt: skip
-
-    def _free(self, terms: Sequence[Term]) -> list[Free]:
-        low, high = self.balance.data.stroke
-        found = []
-        for i, term in enumerate(terms):
-            kind = ent.kind_of(term.entry)
-            waves = any(p.unit == ent.PHASE and p.name in term.entry for p in kind.parameters)
-            for p in ent.free_parameters(term.entry, linear=False):
-                if p.name not in term.free:
-                    continue
-                value, least, most = float(term.entry[p.name]), p.lowest, p.high
-                log = p.lowest >= 0.0 and value > 0.0
-                step = 0.02 if log else max(0.02 * abs(value), 1e-9 * (high - low if p.unit == "m" else 1.0))
-                if p.unit == ent.PHASE:
-                    step = 0.05
-                elif p.name == ent.PERIOD:
-                    # A wave longer than the stroke is a slope by another name.
-                    step, most = min(0.02, 0.02 * value / (high - low)), min(p.high, LONGEST * (high - low))
-                elif p.unit == "Hz":
-                    # Beyond the motion's bandwidth nothing swings that the recording could show.
-                    most = min(p.high, self.balance.noise.bandwidth)
-                    step = min(0.02, 0.01 / (value * self.balance.data.seconds)) if waves else step
-                elif p.unit == "s":
-                    least = max(p.lowest, min(self.balance.data.period, value))
-                elif p.unit == "m" and p.lowest < 0.0 and p.name not in kind.linear:
-                    step = 0.002 * (high - low)
-                found.append(Free(i, p.name, least, most, log, step))
-        return found
 
     def _tangents(
         self, terms: list[Term], free: Sequence[Free], system: System, c: Floats, weights: Floats

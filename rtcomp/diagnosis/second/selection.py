@@ -13,7 +13,8 @@ from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import ForceBalance
 from rtcomp.diagnosis.second.baseline import settle
 from rtcomp.diagnosis.second.candidates import Candidate, candidates, started
-from rtcomp.diagnosis.second.fit import Fitted, Fitter, Term
+from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.diagnosis.second.free import Term
 from rtcomp.diagnosis.second.intervals import told
 from rtcomp.diagnosis.second.replicates import best, free_columns, null_of
 from rtcomp.diagnosis.second.screening import Screen, Screened

@@ -18,6 +18,7 @@ from rtcomp.diagnosis.second.cache import Cache, Group
 from rtcomp.diagnosis.second.data import Data, Segment
 from rtcomp.diagnosis.second.entries import Entry
 from rtcomp.diagnosis.second.noise import Noise
+from rtcomp.diagnosis.second.reaches import grid
 from rtcomp.diagnosis.second.spectrum import filtered
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place, catalogue
@@ -26,10 +27,6 @@ from rtcomp.stage.balance import around_rows, forces, parts_of_drive
 from rtcomp.stage.sensed import true_position
 from rtcomp.stage.stage import Stage
 
-GRID = 22
-"""Yield displacements of the coarse friction grid, from the sensor's grain to an eighth of the stroke."""
-MOST_OWN = 10
-"""Believed yield displacements up to which they are taken into the grid as they are."""
 BASE = ("mass", "viscous", "micro_damping")
 """Numbers whose columns come first. After them that of the speed of micro-damping, to first order, then
 those of the friction units, and a constant force."""
@@ -66,7 +63,7 @@ class Signals:
         self.noise = noise or Noise.of(stage, data)
         share = min(1.0, self.noise.bandwidth / (0.5 * data.rate))
         self.grain = 1.5 * self.noise.rms * float(np.sqrt(share))
-        self.coarse = _grid(stage, data, self.grain)
+        self.coarse = grid(stage, data, self.grain)
         """Yield displacements (m) over all that the recording could show."""
         self.reaches = self.coarse
         self.step = float(np.log(self.reaches[1] / self.reaches[0]))
@@ -330,25 +327,6 @@ def _active(effect: Effect) -> bool:
 def _refitted(entry: Entry) -> bool:
     kind = ent.kind_of(entry)
     return ent.adds_force(kind) and bool(kind.linear)
-
-
-def _grid(stage: Stage, data: Data, grain: float) -> Floats:
-    """Return yield displacements (m) from the grain to an eighth of the stroke, the believed ones in it."""
-    low, high = data.stroke
-    longest = 0.125 * (high - low)
-    shortest = max(2.0 * grain, 1e-5 * longest)
-    friction = stage.friction
-    if isinstance(friction, MaxwellSlip):
-        shortest = min(shortest, *(r for _, r in friction.elements))
-    return np.geomspace(min(shortest, 0.5 * longest), longest, GRID)
-
-
-def joined(own: Floats, grid: Floats, step: float) -> Floats:
-    """Return believed yield displacements (m) and those of a grid that are not close to one of them."""
-    if not own.size:
-        return np.sort(grid)
-    apart = np.min(np.abs(np.log(grid[:, None] / own[None, :])), axis=1)
-    return np.sort(np.concatenate([own, grid[apart > 0.3 * step]]))
 
 
 def _second_difference(x: Floats, rate: float) -> Floats:
