@@ -241,6 +241,8 @@ class Diagnosis:
     """Where the balance of forces decides nothing: what was decided by instead."""
     retuned_stage: Stage | None = None
     """The believed physics with the values that fit best, where it was decided by position."""
+    not_tried: Sequence[str] = ()
+    """What the budget left no time for; empty where the search came to its end."""
 
     def sentence(self) -> str:
         """Return the verdict in one sentence."""
@@ -277,7 +279,10 @@ class Diagnosis:
             "not_observable": list(self.not_observable),
             "smallest_seen": [s.to_json() for s in self.sights if s.seen],
             "notes": list(self.notes),
+            "stopped_early": bool(self.not_tried),
         }
+        if self.not_tried:
+            data["not_tried"] = list(self.not_tried)
         if self.position is not None:
             data["fit"]["position_error"] = self.position.to_json()
         if self.next_experiment is not None:

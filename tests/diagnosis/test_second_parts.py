@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from recorded import cut, run, stage, there_and_back
 
 from rtcomp.diagnosis.second import entries as ent
-from rtcomp.diagnosis.second.balance import ForceBalance
+from rtcomp.diagnosis.second.balance import ForceBalance, reserved_blocks
 from rtcomp.diagnosis.second.baseline import baseline
 from rtcomp.diagnosis.second.candidates import Candidate
 from rtcomp.diagnosis.second.data import load_data
@@ -37,6 +37,17 @@ FORMS = [
     if kind.searchable and ent.adds_force(kind) and kind.linear
     for form in (list(kind.forms) or [""])
 ]
+
+
+@given(st.integers(10, 25), st.sets(st.integers(0, 24)))
+def test_one_block_of_five_is_reserved_but_none_that_is_unlike_the_others(
+    count: int, unlike: set[int]
+) -> None:
+    found = reserved_blocks(count, unlike)
+    assert not unlike & set(np.flatnonzero(found).tolist())
+    for first in range(0, count - 2, 5):
+        group = set(range(first, min(first + 5, count)))
+        assert found[sorted(group)].sum() == bool(group - unlike)
 
 
 def one(frequency: Floats) -> Floats:
@@ -167,9 +178,9 @@ def test_a_judgement_needs_motion_in_the_reserved_blocks() -> None:
 
 
 def test_friction_remembers_the_way_to_a_window() -> None:
-    believed, whole = stage(), run(stage(), there_and_back(45.0))
+    believed, whole = stage(), run(stage(), there_and_back(72.0))
     balance = ForceBalance(believed, load_data([whole]))
-    windows, (everything,) = balance.data.segments, load_data([cut(whole, 0, 40_000)]).segments
+    windows, (everything,) = balance.data.segments, load_data([cut(whole, 0, 64_000)]).segments
     assert len(windows) > 1 and everything.before is None
     path = balance._path(everything, [])
     along = balance._units(balance.stage, everything, path, [], [], None)

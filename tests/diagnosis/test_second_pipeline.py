@@ -170,6 +170,19 @@ def test_a_short_budget_gives_the_best_answer_so_far_and_says_what_was_not_tried
     effects = [{"name": "drive-deadband", "width": 0.3}, {"name": "parallel-spring", "stiffness": 2000.0}]
     found = diagnose(stage(), [run(stage(effects=effects), motion())], budget=2.0)
     assert any(note.startswith("not tried within 2 s") for note in found.notes)
+    told = found.to_json()
+    assert told["stopped_early"] and told["not_tried"]
+
+
+@pytest.mark.parametrize("time", [4.3002, 6.0407, 7.1])
+def test_a_jump_of_the_reading_is_found_wherever_it_happens(time: float) -> None:
+    """Also where a part of the recording would otherwise be kept for the judgement."""
+    found = answer(stage(), {"name": "sensor-jump", "size": 2e-5, "time": time})
+    assert names(found) == [("sensor-jump",)]
+    told = found.effects[0].parameters
+    assert told["time"].value == pytest.approx(time, abs=1.0 / RATE)
+    assert told["size"].low <= 2e-5 <= told["size"].high
+    assert not found.to_json()["stopped_early"]
 
 
 def test_another_force_constant_is_one_number_beside_a_believed_spring_too() -> None:

@@ -61,8 +61,10 @@ def answer(
     sets: Sequence[Alternatives],
     reserved: Reserved,
     seed: int,
+    *,
+    late: bool = False,
 ) -> Diagnosis:
-    """Return the diagnosis that a search ends in."""
+    """Return the diagnosis that a search ends in; where it is `late`, without what takes long to tell."""
     balance, base, chosen = fitter.balance, found.baseline, found.chosen
     rest = Rest.of(balance, found)
     spans = told(balance, chosen)
@@ -87,7 +89,8 @@ def answer(
     where = (
         [] if verdict == "consistent" else locate(view, before, after if named else None, seed, believed.axis)
     )
-    seen = sights(fitter, final, found.null, found.beside if final is found.chosen else None)
+    beside = found.beside if final is found.chosen else None
+    seen = [] if late and beside is None else sights(fitter, final, found.null, beside)
     names = {n for e in named for n in e.names}
     return Diagnosis(
         verdict,

@@ -10,7 +10,7 @@ by how far the motion stands above the sensor's noise (`noise.Whitening`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,6 +52,7 @@ class ForceBalance(Signals):
         self.noise_power = 0.0
         """N^2: mean square of what the sensor's noise makes of the residual below the motion's bandwidth."""
         self.block: np.ndarray = np.zeros(0, dtype=np.int64)
+        self._reserved: np.ndarray = np.zeros(0, dtype=np.bool_)
 
     def whiten(self, coefficients: Floats) -> None:
         """Weigh frequencies by what the sensor's noise does to the residual of a fit (base columns)."""
@@ -80,6 +81,7 @@ class ForceBalance(Signals):
         other = ForceBalance(self.stage, data, self.noise)
         other.reaches, other.step, other.grain = self.reaches, self.step, self.grain
         other._whitening, other.blocks, other.block = self._whitening, self.blocks, self.block
+        other._reserved = self._reserved
         other.believed_speed = self.believed_speed
         return other
 
@@ -105,6 +107,9 @@ class ForceBalance(Signals):
         count = min(self.data.seconds / BLOCK_SECONDS, turns / BLOCK_REVERSALS if turns else np.inf)
         self.blocks = int(np.clip(count, FEWEST, MOST))
         self.block = np.arange(sum(kept)) * self.blocks // sum(kept)
+        time = self.plain([s.time for s in self.data.segments])
+        stepped = {int(self.block[np.argmin(np.abs(time - at))]) for at, _ in self.data.jumps}
+        self._reserved = reserved_blocks(self.blocks, stepped)
 
     @property
     def whitening(self) -> Whitening:
@@ -115,8 +120,11 @@ class ForceBalance(Signals):
 
     @property
     def reserved(self) -> np.ndarray:
-        """Blocks for the final judgement, (blocks,) bool: neither fitted nor selected on."""
-        return np.asarray(np.arange(self.blocks) % RESERVED_EVERY == RESERVED_EVERY // 2)
+        """Blocks for the final judgement, (blocks,) bool: neither fitted nor selected on.
+
+        One of every few; a block in which the reading steps is no other's like and stays with the fit.
+        """
+        return self._reserved
 
     def system(self, entries: Sequence[Entry] = (), weights: Floats | None = None) -> System:
         """Return the system with `entries`; `weights` (N/m) of the friction units where entries need them.
@@ -273,6 +281,21 @@ class ForceBalance(Signals):
         assert self._whitening is not None
         pairs = zip(self.data.segments, signals, strict=True)
         return np.concatenate([s[self._whitening.rows(segment)] for segment, s in pairs])
+
+
+def reserved_blocks(count: int, besides: Collection[int]) -> np.ndarray:
+    """Return which of `count` blocks are reserved, (count,) bool: of every few the middle one, if it may be.
+
+    Where that is one of `besides`, the next that is not; where all are, none.
+    """
+    found = np.zeros(count, dtype=np.bool_)
+    for first in range(0, count, RESERVED_EVERY):
+        group = [b for b in range(first, first + RESERVED_EVERY) if b < count]
+        middle = RESERVED_EVERY // 2
+        free = [b for b in group[middle:] + group[:middle] if b not in besides]
+        if len(group) > middle and free:
+            found[free[0]] = True
+    return found
 
 
 __all__ = ["BASE", "ForceBalance", "System"]

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from rtcomp.diagnosis.jumps import jumps
 from rtcomp.diagnosis.stretches import LEAST_ROWS, stretches
 from rtcomp.kernels import Floats
+from rtcomp.physics import Effect
 from rtcomp.recording.pieces import bridged
 from rtcomp.recording.reader import Recording
+from rtcomp.stage.sensed import true_position
 
-MOST_ROWS = 40_000
+MOST_ROWS = 64_000
 """Rows of the recording that are used as they are; of longer ones windows are taken, evenly spread."""
 OVERSAMPLED = 10.0
 """Rate over the motion's bandwidth, from which on rows are averaged."""
@@ -75,6 +79,11 @@ class Data:
         """Length of all segments (s)."""
         return float(sum(s.time.size for s in self.segments)) / self.rate
 
+    @cached_property
+    def jumps(self) -> list[tuple[float, float]]:
+        """Times (s) and sizes (m) of steps of the reading that are unlike those before and after them."""
+        return [j for s in self.as_recorded().segments for j in jumps(s.time, s.position)]
+
     def as_recorded(self) -> Data:
         """Return the rows that these are means of."""
         sources = tuple(s.source or s for s in self.segments)
@@ -124,6 +133,15 @@ def averaged(segment: Segment, factor: int) -> Segment:
     held = np.diff(np.interp(edges, np.arange(given.size), given)) / factor
     reference = None if used.reference is None else mean(used.reference)
     return Segment(mean(used.time), mean(used.position), held, reference, used)
+
+
+def behind_reading(segment: Segment, sensors: Sequence[Effect]) -> Floats:
+    """Return the position (m) behind a reading; where rows are means, the mean of what is behind each."""
+    source = segment.source
+    if not sensors or source is None:
+        return true_position(sensors, segment.time, segment.position)
+    x = true_position(sensors, source.time, source.position)
+    return np.asarray(x.reshape(segment.time.size, -1).mean(axis=1))
 
 
 def _windows(segment: Segment, count: int, rows: int) -> list[Segment]:

@@ -26,6 +26,8 @@ from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
 
 Progress = Callable[[float, str], None]
+SEARCH, TELL_APART = 0.6, 0.85
+"""Parts of the budget at which the search ends, and what then tells its models apart."""
 BAND_LIMITED = "the command is taken as band-limited between rows, which fits better than held"
 Located = Callable[[float, Sequence[Place]], None]
 """Told, before anything is named, what part of the force the refitted stage leaves open (rms), and where."""
@@ -77,17 +79,17 @@ def _diagnosed(
         left = (base.sse / max(balance.power, 1e-300)) ** 0.5
         located(left, locate(view, before, None, seed, stage.axis))
     say(1.0, "balance")
-    fitter, found = _searched(objectives, ends, say, seed)
+    fitter, found = _searched(objectives, ends - (1.0 - SEARCH) * budget, say, seed)
     say(0.0, "tell apart")
-    sets = alternatives(fitter, found, ends)
+    sets = alternatives(fitter, found, ends - (1.0 - TELL_APART) * budget)
     say(0.5, "judge")
     if fitter.balance is not balance:
         reserved = Reserved(fitter.balance)
-    done = answer(stage, fitter, found, sets, reserved, seed)
+    done = answer(stage, fitter, found, sets, reserved, seed, late=time.monotonic() > ends)
     say(1.0, "judge")
     notes = [BAND_LIMITED] if len(objectives) > 1 and not fitter.balance.data.held else []
     notes += [f"not tried within {budget:g} s: {what}" for what in found.not_tried]
-    return replace(done, notes=[*notes, *done.notes])
+    return replace(done, notes=[*notes, *done.notes], not_tried=found.not_tried)
 
 
 def _objectives(

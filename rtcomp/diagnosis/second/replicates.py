@@ -65,7 +65,7 @@ def null_of(balance: ForceBalance, fitted: Fitted, screen: Screen, gain: float, 
                 free_columns(again), again.residual
             )
         scale = balance.power / max(other.power, 1e-300)
-        return max(s.gain for s in gains), float(again.errors.sum()) * scale
+        return max((s.gain for s in gains), default=0.0), float(again.errors.sum()) * scale
 
     found: list[tuple[float, float]] = []
     for first, last in ((0, FEW), (FEW, REPLICATES)):
@@ -91,7 +91,7 @@ def _surrogates(balance: ForceBalance, fitted: Fitted, screen: Screen, seed: int
     def one(_: int) -> float:
         turned = size * np.exp(2j * np.pi * random.random(size.size))
         gains = screen.gains(columns, np.fft.irfft(turned, fitted.residual.size))
-        return max(s.gain for s in gains)
+        return max((s.gain for s in gains), default=0.0)
 
     rows = float(np.count_nonzero(~balance.reserved[balance.block]))
     chance = random.normal(1.0, np.sqrt(2.0 / rows), FEW)

@@ -143,8 +143,12 @@ def _tones(balance: ForceBalance, residual: Floats) -> Floats:
 
 
 def _moments(balance: ForceBalance, residual: Floats) -> Floats:
-    """Return times (s) of the largest whitened residuals, apart from each other."""
+    """Return times (s) at which the reading steps, and those of the largest residuals, apart from each other.
+
+    A step stands between two rows of the recording, a residual within what the filter remembers of it.
+    """
     time = balance.plain([s.time for s in balance.data.segments])
+    stepped = [at for at, _ in balance.data.jumps]
     left, found = np.abs(residual), []
     apart = max(10, residual.size // 500)
     for _ in range(PEAKS):
@@ -152,4 +156,4 @@ def _moments(balance: ForceBalance, residual: Floats) -> Floats:
         found.append(float(time[at]))
         left = left.copy()
         left[max(at - apart, 0) : at + apart + 1] = 0.0
-    return np.sort(found)
+    return np.sort([*stepped, *found])

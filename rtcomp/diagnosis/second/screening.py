@@ -31,6 +31,8 @@ class Screen:
 
     def __init__(self, found: Sequence[Candidate], block: np.ndarray, count: int, use: np.ndarray) -> None:
         self.candidates = list(found)
+        if not found:
+            return
         self._use = np.flatnonzero(use).tolist()
         self._edges = list(pairwise(np.searchsorted(block, np.arange(count + 1)).tolist()))
         columns = np.concatenate([c.columns for c in found])
@@ -75,6 +77,8 @@ class Screen:
 
         The columns are those that are free in the fit: not at a bound.
         """
+        if not self.candidates:
+            return []
         norm = np.sqrt(np.einsum("ij,ij->i", model, model))
         model = model / np.where(norm > 0.0, norm, 1.0)[:, None]
         parts = [_Part.of(model[:, a:b], self._columns[:, a:b], residual[a:b]) for a, b in

@@ -74,46 +74,60 @@ def search(
     for step in range(MOST_EFFECTS + 1):
         look = None
         while beam and look is None:
-            look = _sound(_look(fitter.balance, beam[0], seed + step, say), parents[id(beam[0])])
+            late = step > 0 and time.monotonic() > ends
+            look = _sound(_look(fitter.balance, beam[0], seed + step, say, late), parents[id(beam[0])])
             if look is None:
                 beam.pop(0)
         if look is None or look.null is None:
             break
         null = look.null
-        found.chosen, found.null, found.beside = beam[0], null, look.candidates
+        found.chosen, found.null, found.beside = beam[0], null, look.candidates or None
         found.alternatives = [g for g in grown if len(g.terms) == len(beam[0].terms) and g is not beam[0]]
         if step == 0:
             found.screened = _table(look.candidates, look.screened, null)
         done = null.settled(look.gain, float(beam[0].errors.sum()), LEVEL)
         if done or step == MOST_EFFECTS or _exhausted(fitter.balance, beam[0], everything):
             break
+        if time.monotonic() > ends:
+            found.not_tried.append(_further(found.chosen))
+            break
+        began = time.monotonic()
         grown = _grow(fitter, beam[0], look.candidates, look.screened, ends)
+        short = time.monotonic() > ends
         for other in beam[1:] if null.p_value(look.gain) < LEVEL else []:
-            if time.monotonic() > ends:
+            # Another is begun only where one that takes as long would end in time.
+            now = time.monotonic()
+            short = short or 2.0 * now - began > ends
+            if short:
                 break
+            began = now
             beside = _look(fitter.balance, other, None, say)
             grown += _grow(fitter, other, beside.candidates, beside.screened, ends)
-        if time.monotonic() > ends:
-            others = " and ".join(ent.names(found.chosen.entries))
-            found.not_tried.append(f"all further effects beside {others or 'the belief'}")
+        if short:
+            found.not_tried.append(f"some of {_further(found.chosen)}")
         accepted = [g for g in grown if _accepted(fitter.balance, g, _parent(g, beam), null, everything)]
         accepted = _distinct(sorted(accepted, key=_score))[:BEAM]
         parents = {}
         next_beam = []
         for model in accepted:
-            smaller = _pruned(fitter, model, null, everything)
+            smaller = _pruned(fitter, model, null, everything, ends)
             parents[id(smaller)] = float(_parent(model, beam).errors.sum())
             next_beam.append(smaller)
         beam = [m for m in _distinct(sorted(next_beam, key=_score)) if _score(m) < _score(found.chosen)]
         if not beam:
             break
-        beam, grown = _resettled(fitter, found, beam, grown, parents)
-        everything = float(found.baseline.errors.sum())
+        if time.monotonic() < ends:
+            beam, grown = _resettled(fitter, found, beam, grown, parents)
+            everything = float(found.baseline.errors.sum())
         if doubted is not None and doubted(beam[0]):
             found.doubted = True
             break
     _solid(fitter, found)
     return found
+
+
+def _further(model: Fitted) -> str:
+    return f"all further effects beside {' and '.join(ent.names(model.entries)) or 'the belief'}"
 
 
 def _solid(fitter: Fitter, found: Search) -> None:
@@ -179,17 +193,18 @@ class _Look:
 
     @property
     def gain(self) -> float:
-        """The largest gain."""
-        return max(s.gain for s in self.screened)
+        """The largest gain, 0 where no candidate was looked at."""
+        return max((s.gain for s in self.screened), default=0.0)
 
 
-def _look(balance: ForceBalance, model: Fitted, seed: int | None, say: Say) -> _Look:
+def _look(balance: ForceBalance, model: Fitted, seed: int | None, say: Say, late: bool = False) -> _Look:
+    """Look at all candidates beside a model; where it is too `late` for them, only at what chance leaves."""
     names = ent.names(model.entries)
     say(0.0, f"beside {' and '.join(names)}" if names else "search")
-    made = candidates(balance, model, names)
+    made = [] if late else candidates(balance, model, names)
     screen = Screen(made, balance.block, balance.blocks, ~balance.reserved)
     screened = screen.gains(free_columns(model), model.residual)
-    gain = max(s.gain for s in screened)
+    gain = max((s.gain for s in screened), default=0.0)
     say(0.5, f"beside {' and '.join(names)}" if names else "search")
     null = None if seed is None else null_of(balance, model, screen, gain, seed)
     return _Look(made, screened, null)
@@ -277,9 +292,9 @@ def _parent(model: Fitted, beam: Sequence[Fitted]) -> Fitted:
     return next(b for b in beam if ent.names(b.entries) == names)
 
 
-def _pruned(fitter: Fitter, model: Fitted, null: Null | None, everything: float) -> Fitted:
+def _pruned(fitter: Fitter, model: Fitted, null: Null | None, everything: float, ends: float) -> Fitted:
     """Return the model without effects that no longer pass the test beside the others."""
-    while len(model.terms) > 1:
+    while len(model.terms) > 1 and time.monotonic() < ends:
         smaller = [
             fitter.fit([*model.terms[:i], *model.terms[i + 1 :]], model) for i in range(len(model.terms))
         ]

@@ -15,7 +15,7 @@ from rtcomp.diagnosis.bank import SPEED_UNITS, deflections, units_along
 from rtcomp.diagnosis.path import Load, behind_play
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.cache import Cache, Group
-from rtcomp.diagnosis.second.data import Data, Segment
+from rtcomp.diagnosis.second.data import Data, Segment, behind_reading
 from rtcomp.diagnosis.second.entries import Entry
 from rtcomp.diagnosis.second.noise import Noise
 from rtcomp.diagnosis.second.reaches import grid
@@ -24,7 +24,6 @@ from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place, catalogue
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.stage.balance import around_rows, forces, parts_of_drive
-from rtcomp.stage.sensed import true_position
 from rtcomp.stage.stage import Stage
 
 BASE = ("mass", "viscous", "micro_damping")
@@ -139,7 +138,7 @@ class Signals:
 
     def _path(self, segment: Segment, sensors: Sequence[Effect], *, smooth: bool = True) -> Path:
         rate = self.data.rate
-        x = true_position(sensors, segment.time, segment.position)
+        x = behind_reading(segment, sensors)
         slow = filtered(x, rate, self.noise.wiener) if smooth else x
         if self.data.held:
             measured = _second_difference(x, rate)
