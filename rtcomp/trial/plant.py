@@ -94,7 +94,8 @@ def _run(
     commands = np.zeros(reference.size + 1)
     ago = p.sensor_delay / step
     past = np.zeros(int(ago) + 2)
-    late = p.delay / step
+    # The velocity is that of half a sub-step ago (leapfrog): so far before a row its command is not yet there.
+    late = p.delay / step + 0.5
     two = p.second_mass > 0.0
     mass = p.mass - p.second_mass
     x = v = x2 = v2 = h = crept = lagged_speed = lagged_volts = play = rest = integral = before = 0.0

@@ -109,7 +109,17 @@ class ForceBalance(Signals):
         self.block = np.arange(sum(kept)) * self.blocks // sum(kept)
         time = self.plain([s.time for s in self.data.segments])
         stepped = {int(self.block[np.argmin(np.abs(time - at))]) for at, _ in self.data.jumps}
-        self._reserved = reserved_blocks(self.blocks, stepped)
+        self._reserved = reserved_blocks(self.blocks, stepped, self._furthest())
+
+    def _furthest(self) -> set[int]:
+        """Return the blocks in which command, position and speed are lowest and highest."""
+        signals = [
+            [s.voltage for s in self.data.segments],
+            [s.position for s in self.data.segments],
+            [p.v for p in self.paths()],
+        ]
+        rows = [at(self.plain(s)) for s in signals for at in (np.argmin, np.argmax)]
+        return {int(self.block[row]) for row in rows}
 
     @property
     def whitening(self) -> Whitening:
@@ -122,7 +132,8 @@ class ForceBalance(Signals):
     def reserved(self) -> np.ndarray:
         """Blocks for the final judgement, (blocks,) bool: neither fitted nor selected on.
 
-        One of every few; a block in which the reading steps is no other's like and stays with the fit.
+        One of every few, judged within what was fitted: a block in which the reading steps is unlike all
+        others, and one that goes furthest shows what no other does.
         """
         return self._reserved
 
@@ -283,19 +294,20 @@ class ForceBalance(Signals):
         return np.concatenate([s[self._whitening.rows(segment)] for segment, s in pairs])
 
 
-def reserved_blocks(count: int, besides: Collection[int]) -> np.ndarray:
+def reserved_blocks(count: int, *unlike: Collection[int]) -> np.ndarray:
     """Return which of `count` blocks are reserved, (count,) bool: of every few the middle one, if it may be.
 
-    Where that is one of `besides`, the next that is not; where all are, none.
+    Where that is `unlike` the others, the next that is not. Where no block would be left, the last of the
+    reasons does not count.
     """
     found = np.zeros(count, dtype=np.bool_)
-    for first in range(0, count, RESERVED_EVERY):
-        group = [b for b in range(first, first + RESERVED_EVERY) if b < count]
-        middle = RESERVED_EVERY // 2
+    besides = {block for some in unlike for block in some}
+    middle = RESERVED_EVERY // 2
+    for first in range(0, count - middle, RESERVED_EVERY):
+        group = list(range(first, min(first + RESERVED_EVERY, count)))
         free = [b for b in group[middle:] + group[:middle] if b not in besides]
-        if len(group) > middle and free:
-            found[free[0]] = True
-    return found
+        found[free[:1]] = True
+    return found if found.any() or not unlike else reserved_blocks(count, *unlike[:-1])
 
 
 __all__ = ["BASE", "ForceBalance", "System"]

@@ -88,8 +88,8 @@ def with_offset(fitter: Fitter, fitted: Fitted) -> Fitted:
     """
     fitter.offset = True
     beside = fitter.fit([])
-    gained = float(fitted.errors.sum() - beside.errors.sum())
-    if 0.0 < gained < LEAST_GAIN * float(fitted.errors.sum()):
+    gained = 1.0 - float(np.sqrt(beside.errors.sum() / fitted.errors.sum()))
+    if 0.0 < gained < LEAST_GAIN:
         return beside
     fitter.offset = False
     return fitted

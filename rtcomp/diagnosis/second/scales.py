@@ -48,7 +48,8 @@ class Scales:
         v = np.abs(balance.plain([p.v for p in paths]))
         u = np.abs(balance.plain([s.voltage for s in data.segments]))
         low, high = data.stroke
-        quantiles = np.linspace(0.1, 0.9, POINTS)
+        # What cuts a command may show in the highest of it only.
+        quantiles = np.concatenate([np.linspace(0.1, 0.9, POINTS), 1.0 - np.geomspace(0.03, 0.001, 3)])
         moving = v[v > 1e-3 * v.max()] if v.max() > 0 else v
         slow, fast = (max(float(np.quantile(moving, q)), 1e-12) for q in (0.02, 0.9))
         speed = np.geomspace(slow, fast, POINTS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -275,15 +276,15 @@ def _accepted(
     if null is None or model.at_bound:
         return False
     p = null.p_value(log_gain(parent.errors, model.errors))
-    gained = float(parent.errors.sum() - model.errors.sum())
-    if p >= LEVEL or gained <= LEAST_GAIN * everything:
+    gained = math.sqrt(parent.errors.sum()) - math.sqrt(model.errors.sum())
+    if p >= LEVEL or gained <= LEAST_GAIN * math.sqrt(everything):
         return False
     return relative_error(balance, parent) ** 2 - relative_error(balance, model) ** 2 > NEGLIGIBLE**2
 
 
 def _exhausted(balance: ForceBalance, model: Fitted, everything: float) -> bool:
     """Tell whether a model leaves too little for any further effect to matter."""
-    little = float(model.errors.sum()) <= LEAST_GAIN * everything
+    little = math.sqrt(model.errors.sum()) <= LEAST_GAIN * math.sqrt(everything)
     return little or relative_error(balance, model) <= NEGLIGIBLE
 
 

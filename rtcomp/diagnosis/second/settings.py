@@ -3,9 +3,9 @@
 LEVEL = 0.01
 """Level of the one test: share of recordings with nothing missing in which an effect is named."""
 
-LEAST_GAIN = 0.04
-"""Least part of the initial squared error that an effect must remove: 2 % of the rms. Below it an effect may
-be real, but does not matter; much above it what stands beside a strong effect is not looked for."""
+LEAST_GAIN = 0.02
+"""Least part of the initial rms error by which an effect must lower the rms error. Below it an effect may be
+real, but does not matter; much above it what stands beside a strong effect is not looked for."""
 
 NEGLIGIBLE = 3e-3
 """Least force that an effect must explain, over that of the drive, both rms: equations of motion in rows of a
