@@ -94,7 +94,7 @@ def _run(
     commands = np.zeros(reference.size + 1)
     ago = p.sensor_delay / step
     past = np.zeros(int(ago) + 2)
-    # The velocity is that of half a sub-step ago (leapfrog): so far before a row its command is not yet there.
+    # Leapfrog: the velocity is that of half a sub-step ago, and so are the commands that act on it.
     late = p.delay / step + 0.5
     two = p.second_mass > 0.0
     mass = p.mass - p.second_mass

@@ -42,6 +42,16 @@ def test_a_free_mass_in_a_pulled_loop_obeys_newton() -> None:
     assert np.max(np.abs(run.truth - expected)[:400]) < 0.02e-3
 
 
+def test_a_command_acts_from_its_row_to_the_next() -> None:
+    """A free mass under a held force: the second difference of its positions is the mean of both commands."""
+    free = PHYSICS._replace(level=1e-12, viscous=0.0, micro_damping=0.0)
+    loop = LOOP._replace(noise=0.0, resolution=0.0, open=1.0)
+    run = simulate(free, loop, np.random.default_rng(5).uniform(-1.0, 1.0, 400), 1)
+    given = 4.0 / 2.0 * 0.5 * (run.voltage[1:-1] + run.voltage[:-2])
+    bent = run.truth[2:] - 2.0 * run.truth[1:-1] + run.truth[:-2]
+    assert bent * 1e6 == pytest.approx(given, abs=1e-6)
+
+
 def test_in_steady_sliding_the_drive_carries_coulomb_and_viscous_friction() -> None:
     loop = LOOP._replace(noise=0.0, resolution=0.0)
     slow = PHYSICS._replace(micro_damping=0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from rtcomp.diagnosis.second.confidence import alternatives
 from rtcomp.diagnosis.second.data import load_data
 from rtcomp.diagnosis.second.fit import Fitted, Fitter
 from rtcomp.diagnosis.second.noise import Noise
-from rtcomp.diagnosis.second.selection import Search, first_gain, search
+from rtcomp.diagnosis.second.selection import Look, Search, look, search
 from rtcomp.diagnosis.second.settings import BUDGET
 from rtcomp.diagnosis.second.validation import Reserved
 from rtcomp.diagnosis.second.where import Compared, as_force
@@ -26,7 +26,7 @@ from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
 
 Progress = Callable[[float, str], None]
-SEARCH, TELL_APART = 0.6, 0.85
+SEARCH, TELL_APART = 0.75, 0.9
 """Parts of the budget at which the search ends, and what then tells its models apart."""
 BAND_LIMITED = "the command is taken as band-limited between rows, which fits better than held"
 Located = Callable[[float, Sequence[Place]], None]
@@ -71,7 +71,7 @@ def _diagnosed(
     objectives = _objectives(stage, recordings, held)
     if time.monotonic() > ends:
         raise RtcompError(f"the budget of {budget:g} s ended before the stage was refitted; give it more")
-    balance, base = objectives[0]
+    balance, base = objectives[0].balance, objectives[0].base
     reserved = Reserved(balance)
     view = Compared(balance)
     before = as_force(balance, base.residual)
@@ -92,10 +92,22 @@ def _diagnosed(
     return replace(done, notes=[*notes, *done.notes], not_tried=found.not_tried)
 
 
-def _objectives(
-    stage: Stage, recordings: Sequence[Recording], held: bool | None
-) -> list[tuple[ForceBalance, Fitted]]:
-    """Return the force balance and the refitted stage, for each way to take the command, the better first.
+@dataclass(frozen=True)
+class Objective:
+    """One way to take the command: its force balance, the refitted stage, a look at all candidates."""
+
+    fitter: Fitter
+    base: Fitted
+    first: Look | None = None
+
+    @property
+    def balance(self) -> ForceBalance:
+        """Its force balance."""
+        return self.fitter.balance
+
+
+def _objectives(stage: Stage, recordings: Sequence[Recording], held: bool | None) -> list[Objective]:
+    """Return the objective of each way to take the command, the better first.
 
     A loop holds its command from row to row. Where there is no reference the command may be a measured signal
     that goes on between rows: both ways are looked at, each with the best candidate beside it.
@@ -107,10 +119,18 @@ def _objectives(
         data = load_data(recordings, held=way)
         bandwidth = Noise.of(stage, data).bandwidth
         balance = ForceBalance(stage, load_data(recordings, held=way, bandwidth=bandwidth))
-        made.append((balance, baseline(balance)))
+        base = baseline(balance)
+        fitter = Fitter(balance)
+        made.append(Objective(fitter, with_offset(fitter, base)))
     if len(made) == 1:
         return made
-    return sorted(made, key=lambda pair: _left(*pair) - first_gain(*pair))
+    looked = [replace(one, first=look(one.balance, one.base)) for one in made]
+    return sorted(looked, key=_left_beside)
+
+
+def _left_beside(one: Objective) -> float:
+    """Return the logarithm of what the best candidate leaves, to first order."""
+    return _left(one.balance, one.base) - (one.first.gain if one.first is not None else 0.0)
 
 
 def _left(balance: ForceBalance, model: Fitted) -> float:
@@ -119,28 +139,26 @@ def _left(balance: ForceBalance, model: Fitted) -> float:
 
 
 def _searched(
-    objectives: Sequence[tuple[ForceBalance, Fitted]], ends: float, say: Progress, seed: int
+    objectives: Sequence[Objective], ends: float, say: Progress, seed: int
 ) -> tuple[Fitter, Search]:
     """Return the search on the first objective, or on the second where a model found fits better there.
 
     What is missing may hide which way the command goes between rows, and the wrong way looks like a delay.
     """
-    balance, base = objectives[0]
-    fitter = Fitter(balance)
+    best = objectives[0]
 
     def doubted(model: Fitted) -> bool:
-        other = Fitter(objectives[1][0])
+        other = Fitter(objectives[1].balance)
         left = []
         for terms in (model.terms, model.terms[:-1]):
             settle(other, terms)
             left.append(_left(other.balance, other.fit(terms)))
-        return min(left) < _left(balance, model)
+        return min(left) < _left(best.balance, model)
 
     doubt = doubted if len(objectives) > 1 else None
-    found = search(fitter, with_offset(fitter, base), ends, say, seed, doubt)
+    found = search(best.fitter, best.base, ends, say, seed, doubt, best.first)
     if not found.doubted:
-        return fitter, found
-    balance, base = objectives[1]
-    fitter = Fitter(balance)
+        return best.fitter, found
+    fitter = Fitter(objectives[1].balance)
     settle(fitter)
     return fitter, search(fitter, with_offset(fitter, fitter.fit([])), ends, say, seed)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -63,46 +63,50 @@ def search(
     say: Say,
     seed: int = 0,
     doubted: Callable[[Fitted], bool] | None = None,
+    first: Look | None = None,
 ) -> Search:
     """Return the best model that the one test accepts; stops at the time `ends` (time.monotonic).
 
-    Stops too where the objective itself is `doubted` because of the best model so far.
+    Stops too where the objective itself is `doubted` because of the best model so far. `first` is the look at
+    all candidates beside the baseline, where there was one.
     """
     found = Search(baseline, baseline)
     everything = float(baseline.errors.sum())
     beam, parents = [baseline], {id(baseline): everything}
     grown: list[Fitted] = []
     for step in range(MOST_EFFECTS + 1):
-        look = None
-        while beam and look is None:
+        now = None
+        while beam and now is None:
             late = step > 0 and time.monotonic() > ends
-            look = _sound(_look(fitter.balance, beam[0], seed + step, say, late), parents[id(beam[0])])
-            if look is None:
+            at_hand = first if step == 0 else None
+            seen = _judged(fitter.balance, beam[0], seed + step, say, at_hand, late=late)
+            now = _sound(seen, parents[id(beam[0])])
+            if now is None:
                 beam.pop(0)
-        if look is None or look.null is None:
+        if now is None or now.null is None:
             break
-        null = look.null
-        found.chosen, found.null, found.beside = beam[0], null, look.candidates or None
+        null = now.null
+        found.chosen, found.null, found.beside = beam[0], null, now.candidates or None
         found.alternatives = [g for g in grown if len(g.terms) == len(beam[0].terms) and g is not beam[0]]
         if step == 0:
-            found.screened = _table(look.candidates, look.screened, null)
-        done = null.settled(look.gain, float(beam[0].errors.sum()), LEVEL)
+            found.screened = _table(now.candidates, now.screened, null)
+        done = null.settled(now.gain, float(beam[0].errors.sum()), LEVEL)
         if done or step == MOST_EFFECTS or _exhausted(fitter.balance, beam[0], everything):
             break
         if time.monotonic() > ends:
             found.not_tried.append(_further(found.chosen))
             break
         began = time.monotonic()
-        grown = _grow(fitter, beam[0], look.candidates, look.screened, ends)
+        grown = _grow(fitter, beam[0], now.candidates, now.screened, ends)
         short = time.monotonic() > ends
-        for other in beam[1:] if null.p_value(look.gain) < LEVEL else []:
+        for other in beam[1:] if null.p_value(now.gain) < LEVEL else []:
             # Another is begun only where one that takes as long would end in time.
-            now = time.monotonic()
-            short = short or 2.0 * now - began > ends
+            moment = time.monotonic()
+            short = short or 2.0 * moment - began > ends
             if short:
                 break
-            began = now
-            beside = _look(fitter.balance, other, None, say)
+            began = moment
+            beside = look(fitter.balance, other)
             grown += _grow(fitter, other, beside.candidates, beside.screened, ends)
         if short:
             found.not_tried.append(f"some of {_further(found.chosen)}")
@@ -179,17 +183,13 @@ def _resettled(
     return sorted(again, key=_score), [*again, *(fitter.fit(g.terms, g) for g in near)]
 
 
-def first_gain(balance: ForceBalance, model: Fitted) -> float:
-    """Return the largest gain of a candidate beside a model, to first order."""
-    return _look(balance, model, None, lambda _part, _what: None).gain
-
-
 @dataclass(frozen=True)
-class _Look:
+class Look:
     """All candidates beside a model, their gains, the null distribution where it was asked for."""
 
     candidates: list[Candidate]
     screened: list[Screened]
+    screen: Screen
     null: Null | None
 
     @property
@@ -198,28 +198,40 @@ class _Look:
         return max((s.gain for s in self.screened), default=0.0)
 
 
-def _look(balance: ForceBalance, model: Fitted, seed: int | None, say: Say, late: bool = False) -> _Look:
-    """Look at all candidates beside a model; where it is too `late` for them, only at what chance leaves."""
-    names = ent.names(model.entries)
-    say(0.0, f"beside {' and '.join(names)}" if names else "search")
-    made = [] if late else candidates(balance, model, names)
+def look(balance: ForceBalance, model: Fitted) -> Look:
+    """Look at all candidates beside a model, without their null distribution."""
+    made = candidates(balance, model, ent.names(model.entries))
     screen = Screen(made, balance.block, balance.blocks, ~balance.reserved)
-    screened = screen.gains(free_columns(model), model.residual)
-    gain = max((s.gain for s in screened), default=0.0)
-    say(0.5, f"beside {' and '.join(names)}" if names else "search")
-    null = None if seed is None else null_of(balance, model, screen, gain, seed)
-    return _Look(made, screened, null)
+    return Look(made, screen.gains(free_columns(model), model.residual), screen, None)
 
 
-def _sound(look: _Look, parent: float) -> _Look | None:
-    """Return the look where its model can be judged.
+def _judged(
+    balance: ForceBalance, model: Fitted, seed: int, say: Say, first: Look | None, *, late: bool
+) -> Look:
+    """Return the look beside a model with its null distribution.
+
+    `first` is that look, where it was taken before; where it is too `late` for one, only what chance leaves
+    is looked at.
+    """
+    names = ent.names(model.entries)
+    what = f"beside {' and '.join(names)}" if names else "search"
+    say(0.0, what)
+    if late:
+        first = Look([], [], Screen([], balance.block, balance.blocks, ~balance.reserved), None)
+    seen = first or look(balance, model)
+    say(0.5, what)
+    return replace(seen, null=null_of(balance, model, seen.screen, seen.gain, seed))
+
+
+def _sound(seen: Look, parent: float) -> Look | None:
+    """Return what was seen where its model can be judged.
 
     A model that explains recordings of its own no better than the one before explains the real recording has
     shown nothing: it put the drive's force on both sides of the balance.
     """
-    if look.null is not None and float(np.median(look.null.errors)) > parent:
+    if seen.null is not None and float(np.median(seen.null.errors)) > parent:
         return None
-    return look
+    return seen
 
 
 def _grow(
@@ -329,4 +341,4 @@ def _table(
     ]
 
 
-__all__ = ["Search", "Term", "doubts", "search"]
+__all__ = ["Look", "Search", "Term", "doubts", "look", "search"]
