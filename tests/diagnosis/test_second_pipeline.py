@@ -16,9 +16,11 @@ from rtcomp.errors import RtcompError
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics import Effect, Parameter, Place, catalogue
 from rtcomp.physics.wires import FRICTION, VELOCITY
-from rtcomp.recording.reader import Recording
+from rtcomp.recording.reader import Recording, read
 from rtcomp.stage.simulate import Simulator
 from rtcomp.stage.stage import Stage
+from rtcomp.trial.draw import Plan, draw
+from rtcomp.trial.stagefile import write_case
 
 THIN = {"stage": {"mass": 2.0, "force_constant": 4.0, "voltage_limit": 10.0}, "rate": RATE}
 
@@ -44,6 +46,15 @@ def test_nothing_missing_is_said_so() -> None:
     assert found.verdict == "consistent" and not found.effects
     assert found.fit.after < 2.0 * found.fit.floor
     assert {s.name for s in found.sights if s.seen} >= {"cogging", "drive-offset", "drive-deadband"}
+
+
+def test_a_recording_that_leaves_less_than_its_replicates_hides_nothing(tmp_path: Path) -> None:
+    """A clean axis with a coarse encoder, whose counts replicates meet at other places."""
+    case = draw(Plan("case", "clean", (), "full", 3545313852817896335, "geared-joint"))
+    write_case(tmp_path / "case", case.believed, case.run("train"), case.loop)
+    recording = read(tmp_path / "case" / "train.csv.gz", {})
+    found = diagnose(Stage.load(tmp_path / "case" / "stage.yaml"), [recording], budget=300.0)
+    assert found.verdict in ("consistent", "retuned") and not found.effects
 
 
 @pytest.mark.parametrize("belief", [stage(), Stage.from_dict(THIN)], ids=["full", "without friction"])

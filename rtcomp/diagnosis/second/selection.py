@@ -72,7 +72,7 @@ def search(
     """
     found = Search(baseline, baseline)
     everything = float(baseline.errors.sum())
-    beam, parents = [baseline], {id(baseline): everything}
+    beam, parents = [baseline], {id(baseline): math.inf}
     grown: list[Fitted] = []
     for step in range(MOST_EFFECTS + 1):
         now = None
