@@ -288,7 +288,7 @@ def test_prove(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     The budget is one that a busy machine does not use up: the answers do not depend on its load.
     """
     out = tmp_path / "trial"
-    patient = f"{sys.executable} -m rtcomp diagnose --method second --budget 600"
+    patient = f"{sys.executable} -m rtcomp diagnose --method second --budget 200"
     more = ("--cases", 8, "--seed", 11, "--method", "first", "--diagnose", patient)
     run = trial(out, *more, timeout=3000.0)
     with capsys.disabled():
