@@ -75,31 +75,31 @@ def search(
     beam, parents = [baseline], {id(baseline): math.inf}
     grown: list[Fitted] = []
     for step in range(MOST_EFFECTS + 1):
-        now = None
-        while beam and now is None:
+        judged = None
+        while beam and judged is None:
             late = step > 0 and time.monotonic() > ends
             at_hand = first if step == 0 else None
             seen = _judged(fitter.balance, beam[0], seed + step, say, at_hand, late=late)
-            now = _sound(seen, parents[id(beam[0])])
-            if now is None:
+            judged = _sound(seen, parents[id(beam[0])])
+            if judged is None:
                 beam.pop(0)
-        if now is None or now.null is None:
+        if judged is None or judged.null is None:
             break
-        null = now.null
-        found.chosen, found.null, found.beside = beam[0], null, now.candidates or None
+        null = judged.null
+        found.chosen, found.null, found.beside = beam[0], null, judged.candidates or None
         found.alternatives = [g for g in grown if len(g.terms) == len(beam[0].terms) and g is not beam[0]]
         if step == 0:
-            found.screened = _table(now.candidates, now.screened, null)
-        done = null.settled(now.gain, float(beam[0].errors.sum()), LEVEL)
+            found.screened = _table(judged.candidates, judged.screened, null)
+        done = null.settled(judged.gain, float(beam[0].errors.sum()), LEVEL)
         if done or step == MOST_EFFECTS or _exhausted(fitter.balance, beam[0], everything):
             break
         if time.monotonic() > ends:
             found.not_tried.append(_further(found.chosen))
             break
         began = time.monotonic()
-        grown = _grow(fitter, beam[0], now.candidates, now.screened, ends)
+        grown = _grow(fitter, beam[0], judged.candidates, judged.screened, ends)
         short = time.monotonic() > ends
-        for other in beam[1:] if null.p_value(now.gain) < LEVEL else []:
+        for other in beam[1:] if null.p_value(judged.gain) < LEVEL else []:
             # Another is begun only where one that takes as long would end in time.
             moment = time.monotonic()
             short = short or 2.0 * moment - began > ends
