@@ -130,7 +130,8 @@ class Fit:
 class PositionFit:
     """Mean absolute errors of position (m) of a stage let go at points of the recording, driven as it was.
 
-    On windows of `seconds` that were left out of the fit; the choice between explanations may have used them.
+    On windows of `seconds` that took part neither in the fit nor in the choice between explanations (in the
+    first diagnosis: not in the fit).
     """
 
     before: float
@@ -240,7 +241,7 @@ class Diagnosis:
     position: PositionFit | None = None
     """Where the balance of forces decides nothing: what was decided by instead."""
     retuned_stage: Stage | None = None
-    """The believed physics with the values that fit best, where it was decided by position."""
+    """The believed physics with the values that fit best."""
     not_tried: Sequence[str] = ()
     """What the budget left no time for; empty where the search came to its end."""
 

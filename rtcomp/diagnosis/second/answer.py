@@ -17,13 +17,14 @@ from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import ForceBalance
 from rtcomp.diagnosis.second.confidence import Alternatives
 from rtcomp.diagnosis.second.detectability import sights
-from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.diagnosis.second.fit import Fitter
+from rtcomp.diagnosis.second.fitted import Fitted
 from rtcomp.diagnosis.second.intervals import Told, numbers, told
 from rtcomp.diagnosis.second.selection import Search
 from rtcomp.diagnosis.second.settings import LEAST_GAIN, LEFT, LEVEL, TOLERANCE
-from rtcomp.diagnosis.second.stage_of import stage_of, with_forces
+from rtcomp.diagnosis.second.stage_of import with_forces
 from rtcomp.diagnosis.second.validation import Reserved
-from rtcomp.diagnosis.second.where import Compared, above_noise, as_force, curves
+from rtcomp.diagnosis.second.where import Compared, curves
 from rtcomp.errors import ConfigError, RtcompError
 from rtcomp.stage.stage import Stage
 from rtcomp.units import for_axis, prefixed
@@ -41,10 +42,10 @@ class Rest:
     """Part of the baseline's error above the noise."""
 
     @classmethod
-    def of(cls, balance: ForceBalance, found: Search) -> Rest:
+    def of(cls, fitter: Fitter, found: Search) -> Rest:
         """Measure it against the replicates of the chosen model."""
         error, first = float(found.chosen.errors.sum()), float(found.baseline.errors.sum())
-        relative = above_noise(balance, found.chosen)
+        relative = fitter.above_noise(found.chosen)
         if found.null is None:
             return cls(relative > TOLERANCE, 1.0 if not found.chosen.terms else error / first)
         noise = float(np.median(found.null.errors))
@@ -66,22 +67,22 @@ def answer(
 ) -> Diagnosis:
     """Return the diagnosis that a search ends in; where it is `late`, without what takes long to tell."""
     balance, base, chosen = fitter.balance, found.baseline, found.chosen
-    rest = Rest.of(balance, found)
-    spans = told(balance, chosen)
+    rest = Rest.of(fitter, found)
+    spans = told(fitter, chosen)
     nearest = rest.significant and rest.share > LEFT
     notes = _notes(balance, found, nearest)
     shares = _shares(base, chosen, sets)
-    named = [] if nearest else _named(balance, chosen, spans, sets, shares, rest)
+    named = [] if nearest else _named(fitter, chosen, spans, sets, shares, rest)
     final = chosen if named else base
     view = Compared(balance)
-    before, after = as_force(balance, base.residual), as_force(balance, final.residual)
+    before, after = fitter.force(base), fitter.force(final)
     if rest.significant or (chosen.terms and not named):
         left = locate(view, after, None, seed, believed.axis)
         part = rest.share if named else 1.0
         named.append(Named(UNEXPLAINED, 1.0, {}, part, curve=left_over(left)))
-    tuned = numbers(balance, believed, final)
-    stages, moved = _stages(believed, balance, base, final, tuned, bool(named))
-    verdict, matters = _verdict(named, balance, believed, base, moved)
+    tuned = numbers(fitter, believed, final)
+    stages, moved = _stages(believed, fitter, base, final, tuned, bool(named))
+    verdict, matters = _verdict(named, fitter, believed, base, moved)
     if not matters:
         stages["after"] = stages["retuned"] = believed
     errors = reserved.judge({"before": believed, **stages})
@@ -100,7 +101,7 @@ def answer(
         fit,
         [s.name for s in seen if not s.seen and s.name not in names],
         stages["after"],
-        _experiment(balance, chosen, sets, named, view),
+        _experiment(fitter, chosen, sets, named, view),
         seen,
         [Candidate(n, _part(g), _z(p), True) for n, g, p in found.screened],
         notes,
@@ -108,6 +109,8 @@ def answer(
         before,
         after,
         balance.reserved[balance.block].astype(np.float64),
+        fitter.position(believed, stages["retuned"], stages["after"], seed),
+        stages["retuned"],
     )
 
 
@@ -130,14 +133,15 @@ def _shares(base: Fitted, chosen: Fitted, sets: Sequence[Alternatives]) -> list[
 
 
 def _named(
-    balance: ForceBalance,
+    fitter: Fitter,
     chosen: Fitted,
     spans: Sequence[Told],
     sets: Sequence[Alternatives],
     shares: Sequence[float],
     rest: Rest,
 ) -> list[Named]:
-    drawn = curves(balance, chosen)
+    without = [fitter.without(chosen, i) for i in range(len(chosen.terms))]
+    drawn = curves(fitter.balance, chosen.entries, fitter.force(chosen), without)
     found = []
     for one, span, share, curve in zip(sets, spans, shares, drawn, strict=True):
         sure = one.probability * (1.0 - (rest.share if rest.significant else 0.0))
@@ -149,20 +153,20 @@ def _named(
 
 
 def _stages(
-    believed: Stage, balance: ForceBalance, base: Fitted, final: Fitted, tuned: Numbers, named: bool
+    believed: Stage, fitter: Fitter, base: Fitted, final: Fitted, tuned: Numbers, named: bool
 ) -> tuple[dict[str, Stage], list[Retuned]]:
     """Return the retuned and the extended stage, and the numbers of the belief that moved."""
-    stages = {"retuned": stage_of(balance, base), "after": stage_of(balance, final)}
+    stages = {"retuned": fitter.stage(base), "after": fitter.stage(final)}
     moved = retunings(tuned, believed.axis)
     # Forces whose size is no number of the model cannot have moved with the others.
     fixed = any(
         ent.adds_force(ent.kind_of(e)) and not ent.kind_of(e).linear for e in believed.mechanics.effects
     )
-    factor = None if named or fixed else all_by_one_factor(numbers(balance, believed, final, effects=True))
+    factor = None if named or fixed else all_by_one_factor(numbers(fitter, believed, final, effects=True))
     if factor is not None:
         stages = {name: with_forces(stage, 1.0 / factor[0]) for name, stage in stages.items()}
         moved = [force_constant(believed, *factor)]
-    return stages, moved + _found(balance, believed, tuned)
+    return stages, moved + _found(fitter.balance, believed, tuned)
 
 
 def _found(balance: ForceBalance, believed: Stage, tuned: Numbers) -> list[Retuned]:
@@ -182,17 +186,13 @@ def _found(balance: ForceBalance, believed: Stage, tuned: Numbers) -> list[Retun
 
 
 def _verdict(
-    named: Sequence[Named], balance: ForceBalance, believed: Stage, base: Fitted, moved: Sequence[Retuned]
+    named: Sequence[Named], fitter: Fitter, believed: Stage, base: Fitted, moved: Sequence[Retuned]
 ) -> tuple[Verdict, bool]:
     """Return the verdict, and whether other numbers than the believed ones are given."""
     if any(e.names != UNEXPLAINED for e in named):
         return "missing-physics", True
-    drive, needed = balance.both_sides(believed)
-    rows = ~balance.reserved[balance.block]
-    as_believed = float(np.mean((drive - needed)[rows] ** 2))
-    retuned = float(np.mean(as_force(balance, base.residual)[rows] ** 2))
-    better = math.sqrt(retuned) < (1.0 - LEAST_GAIN) * math.sqrt(as_believed)
-    relative = math.sqrt(as_believed / max(float(np.mean(drive[rows] ** 2)), 1e-300))
+    relative = fitter.relative_of(believed)
+    better = fitter.relative(base) < (1.0 - LEAST_GAIN) * relative
     matters = bool(moved) and better and relative > TOLERANCE
     if named:
         # Numbers bent to an unknown cause may do worse on other motion; friction where none was, not.
@@ -212,7 +212,7 @@ def _notes(balance: ForceBalance, found: Search, nearest: bool) -> list[str]:
 
 
 def _experiment(
-    balance: ForceBalance,
+    fitter: Fitter,
     chosen: Fitted,
     sets: Sequence[Alternatives],
     named: Sequence[Named],
@@ -223,7 +223,7 @@ def _experiment(
         if len(one.names) < 2 or not any(e.names == one.names for e in named):
             continue
         try:
-            stages = [stage_of(balance, m) for m in one.models[:2]]
+            stages = [fitter.stage(m) for m in one.models[:2]]
             return next_experiment(stages[0], stages[1], (one.names[0], one.names[1]), view)
         except (ConfigError, RtcompError):
             return None

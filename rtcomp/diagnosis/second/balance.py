@@ -23,7 +23,7 @@ from rtcomp.diagnosis.second.noise import Noise, Whitening
 from rtcomp.diagnosis.second.reaches import MOST_OWN, joined
 from rtcomp.diagnosis.second.settings import BLOCK_REVERSALS, BLOCK_SECONDS, RESERVED_EVERY
 from rtcomp.diagnosis.second.signals import BASE, Signals, key_of
-from rtcomp.diagnosis.second.spectrum import filtered
+from rtcomp.diagnosis.second.spectrum import filtered, spectrum
 from rtcomp.kernels import Floats
 from rtcomp.physics import Place
 from rtcomp.stage.balance import around_rows, forces, parts_of_drive
@@ -272,6 +272,14 @@ class ForceBalance(Signals):
             given.append(mean)
             needed.append(f.mass * p.measured - f.others())
         return self.smooth(given), self.smooth(needed)
+
+    @property
+    def force_bandwidth(self) -> float:
+        """Hz, up to which the drive's force stands above what the sensor's noise makes of the residual."""
+        frequency, density = spectrum(self._drive_side([], []), self.data.rate)
+        noise = 1.0 / (self.whitening.white(frequency) ** 2 * 0.5 * self.data.rate)
+        below = np.flatnonzero(density < noise)
+        return float(frequency[max(below[0] - 1, 0) if below.size else -1])
 
     def drive_force(self) -> Floats:
         """Return the force of the believed drive (N, (n,)) below the motion's bandwidth."""

@@ -8,7 +8,8 @@ import numpy as np
 
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import ForceBalance
-from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.diagnosis.second.fit import Fitter
+from rtcomp.diagnosis.second.fitted import Fitted
 from rtcomp.diagnosis.second.free import Term
 from rtcomp.diagnosis.second.settings import LEAST_GAIN
 from rtcomp.kernels import Floats
@@ -97,6 +98,8 @@ def with_offset(fitter: Fitter, fitted: Fitted) -> Fitted:
 
 def settle(fitter: Fitter, terms: Sequence[Term] = ()) -> None:
     """Put friction's yield displacements and the speed of micro-damping to what a model of `terms` has."""
+    if not fitter.gridded:
+        return
     _put_grid(fitter, terms)
     _damp(fitter, terms)
 

@@ -16,7 +16,8 @@ from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import BASE, ForceBalance
 from rtcomp.diagnosis.second.entries import Entry
-from rtcomp.diagnosis.second.fit import Fitted
+from rtcomp.diagnosis.second.fit import Fitter
+from rtcomp.diagnosis.second.fitted import Fitted
 from rtcomp.diagnosis.second.free import Term
 from rtcomp.diagnosis.second.scales import Scales
 from rtcomp.errors import ConfigError
@@ -42,6 +43,8 @@ class Candidate:
     low: Floats
     high: Floats
     """Bounds of the sizes, (q,) each."""
+    solved: bool = False
+    """Whether a fit solves for its sizes, wherever they begin."""
 
     @property
     def name(self) -> str:
@@ -71,23 +74,27 @@ def _denied(balance: ForceBalance, number: str) -> bool:
 
 
 def candidates(
-    balance: ForceBalance, fitted: Fitted, taken: Sequence[str] = (), *, events: bool = False
+    fitter: Fitter, fitted: Fitted, taken: Sequence[str] = (), *, events: bool = False
 ) -> list[Candidate]:
     """Return every candidate beside a fitted model, with the columns it would add to it.
 
     With `events`, those only that happen once, at a moment that the residual shows.
     """
-    scales = Scales.of(balance, fitted)
-    offset = fitted.coefficients[balance.size - 1] != 0.0 or any(ent.kind_of(e).bias for e in fitted.entries)
+    balance = fitter.balance
+    scales = Scales.of(fitter, fitted)
+    offset = fitter.has_offset(fitted) or any(ent.kind_of(e).bias for e in fitted.entries)
     kinds = [
         k
         for k in searchable(balance)
-        if k.name not in taken and not (offset and _only_bias(k, balance)) and ent.happens_once(k) >= events
+        if k.name not in taken
+        and fitter.judges(k)
+        and not (offset and _only_bias(k, balance))
+        and ent.happens_once(k) >= events
     ]
-    points = {k: list(_points(k, scales, balance)) for k in kinds}
+    points = {k: list(_points(k, scales, fitter)) for k in kinds}
 
     def make(item: tuple[type[Effect], tuple[Entry, str]]) -> Candidate | None:
-        return _candidate(balance, fitted, *item)
+        return _candidate(fitter, fitted, *item)
 
     # What changes nothing at its first point (friction, where there is none) is not tried at the others.
     first = shared(make, [(kind, found[0]) for kind, found in points.items() if found])
@@ -97,25 +104,26 @@ def candidates(
     return [*shown, *(c for c in shared(make, rest) if c is not None)]
 
 
-def _points(kind: type[Effect], scales: Scales, balance: ForceBalance) -> Iterator[tuple[Entry, str]]:
+def _points(kind: type[Effect], scales: Scales, fitter: Fitter) -> Iterator[tuple[Entry, str]]:
     """Go through entries at start values, and the linear parameter looked at ("" for the entry as is)."""
-    rotary = balance.stage.axis == "rotary"
+    rotary = fitter.balance.stage.axis == "rotary"
     own = [p for p in kind.parameters if rotary or p.unit != "N m"]
     for form in list(kind.forms) or [""]:
         base: Entry = {"name": kind.name, **({"form": form} if form else {})}
         base.update({p.name: ent.neutral(kind, p.name) for p in own if p.name in kind.linear})
         nonlinear = [p for p in own if p.name not in kind.linear and _searched(kind, p)]
-        looked = [""] if ent.adds_force(kind) else [n for n in kind.linear if n in base] or [""]
+        looked = [""] if fitter.linear(kind) else [n for n in kind.linear if n in base] or [""]
         for linear in looked:
             # What only a wave has stays out of a slope.
             moved = [p for p in nonlinear if _of_linear(kind, p, linear)]
             still = {p.name: (scales.of_parameter(p, kind) or [0.0])[0] for p in nonlinear if p not in moved}
             ranges = [
-                _phases(kind, base) if p.unit == ent.PHASE else scales.of_parameter(p, kind) for p in moved
+                _phases(kind, base, fitter) if p.unit == ent.PHASE else scales.of_parameter(p, kind)
+                for p in moved
             ]
             for values in itertools.product(*ranges):
                 yield {**base, **still, **dict(zip([p.name for p in moved], values, strict=True))}, linear
-        for name in [] if ent.adds_force(kind) else kind.linear:
+        for name in [] if fitter.linear(kind) else kind.linear:
             p = ent.parameter(kind, name)
             if name in base and p.unit in NOT_IN_PROPORTION:
                 still = {q.name: (scales.of_parameter(q, kind) or [0.0])[0] for q in nonlinear}
@@ -133,9 +141,9 @@ def _of_linear(kind: type[Effect], p: Parameter, linear: str) -> bool:
     return not (waves and only) or not linear or _waves_of(kind, linear)
 
 
-def _phases(kind: type[Effect], entry: Entry) -> list[float]:
+def _phases(kind: type[Effect], entry: Entry, fitter: Fitter) -> list[float]:
     """Return the phases to start from: one where quarter periods do for the rest."""
-    if not ent.adds_force(kind) or ent.waves(kind, {**entry, **{p.name: 0.0 for p in kind.parameters}}):
+    if not fitter.linear(kind) or ent.waves(kind, {**entry, **{p.name: 0.0 for p in kind.parameters}}):
         return [0.0]
     return [float(a) for a in np.linspace(0.0, np.pi, 4, endpoint=False)]
 
@@ -145,20 +153,20 @@ def _waves_of(kind: type[Effect], linear: str) -> bool:
 
 
 def _candidate(
-    balance: ForceBalance, fitted: Fitted, kind: type[Effect], point: tuple[Entry, str]
+    fitter: Fitter, fitted: Fitted, kind: type[Effect], point: tuple[Entry, str]
 ) -> Candidate | None:
     """Make a candidate: columns of free size, or what the model changes by with the entry at work."""
     entry, linear = point
     try:
-        if ent.adds_force(kind):
+        if fitter.linear(kind):
             parts = ent.basis(entry)
-            columns = balance.forces_of([*fitted.entries, entry])
-            return _finite(Candidate(Term.of(entry), tuple(parts), columns, *ent.bounds_of(entry)))
+            columns = fitter.units([*fitted.entries, entry])
+            return _finite(Candidate(Term.of(entry), tuple(parts), columns, *ent.bounds_of(entry), True))
         if not linear:
-            change = _change(balance, fitted, entry)[None, :]
+            change = fitter.change(fitted, entry)[None, :]
             return _finite(Candidate(Term.of(entry), (entry,), change, np.zeros(1), np.full(1, np.inf)))
         p = ent.parameter(kind, linear)
-        step = _step(p, balance)
+        step = _step(p, fitter.balance)
         phases = [p.name for p in kind.parameters if p.unit == ent.PHASE]
         if _waves_of(kind, linear):
             parts = [{**entry, linear: step, phases[0]: angle} for angle in (0.0, 0.5 * np.pi)]
@@ -174,7 +182,7 @@ def _candidate(
                 np.array([(p.lowest - entry[linear]) / step]),
                 np.array([(p.high - entry[linear]) / step]),
             )
-        columns = np.array([_change(balance, fitted, part) for part in parts])
+        columns = np.array([fitter.change(fitted, part) for part in parts])
         return _finite(Candidate(term, tuple(parts), columns, low, high))
     except ConfigError:
         return None
@@ -190,7 +198,7 @@ def started(candidate: Candidate, sizes: Floats) -> Term:
     """Return the term to fit from: the candidate with the sizes that the screening found."""
     entry = candidate.term.entry
     kind = ent.kind_of(entry)
-    if ent.adds_force(kind):
+    if candidate.solved:
         return candidate.term
     moved = {n for part in candidate.parts for n in part if part[n] != entry[n]}
     if not moved:
@@ -230,8 +238,3 @@ def _step(p: Parameter, balance: ForceBalance) -> float:
     if p.unit == "m":
         size = max(3.0 * balance.noise.rms, 1e-4 * (high - low))
     return min(size, 0.5 * p.high)
-
-
-def _change(balance: ForceBalance, fitted: Fitted, entry: Entry) -> Floats:
-    """Return by how much more force the model accounts for with an entry at work, (n,), coefficients held."""
-    return fitted.residual - balance.error([*fitted.entries, entry], fitted.coefficients, fitted.weights)

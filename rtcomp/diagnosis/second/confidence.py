@@ -11,7 +11,8 @@ import numpy as np
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.candidates import candidates, started
-from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.diagnosis.second.fit import Fitter
+from rtcomp.diagnosis.second.fitted import Fitted
 from rtcomp.diagnosis.second.free import Term
 from rtcomp.diagnosis.second.replicates import best, free_columns
 from rtcomp.diagnosis.second.screening import Screen
@@ -90,10 +91,10 @@ def _by_cell(fitter: Fitter, model: Fitted) -> Floats:
 
     What acts now and then, as a drive's limit, shows in some of them: of ten blocks it would be by chance.
     """
-    block = fitter.balance.block
-    cell = np.arange(block.size) * (fitter.balance.blocks * CELLS) // block.size
+    block = fitter.block
+    cell = np.arange(block.size) * (fitter.blocks * CELLS) // block.size
     used = fitter.use[block]
-    found = np.bincount(cell[used], model.residual[used] ** 2, fitter.balance.blocks * CELLS)
+    found = np.bincount(cell[used], model.residual[used] ** 2, fitter.blocks * CELLS)
     return np.asarray(found[np.bincount(cell[used], minlength=found.size) > 0] + 1e-300)
 
 
@@ -103,7 +104,7 @@ def _independent(fitter: Fitter, model: Fitted) -> float:
     n / (1 + 2 sum of rho_k^2) by the autocorrelation rho, here from its spectrum (Bayley and Hammersley 1946,
     Suppl. J. R. Stat. Soc. 8(2)).
     """
-    rest = model.residual[fitter.use[fitter.balance.block]]
+    rest = model.residual[fitter.rows]
     power = np.abs(np.fft.rfft(rest)) ** 2
     return float(min(2.0 * np.sum(power) ** 2 / max(float(np.sum(power**2)), 1e-300), rest.size))
 
@@ -127,11 +128,8 @@ def _others(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -
     ]
     if known or time.monotonic() > ends:
         return known
-    balance = fitter.balance
-    made = candidates(balance, rest, [*ent.names(rest.entries), str(name)])
-    screened = Screen(made, balance.block, balance.blocks, fitter.use).gains(
-        free_columns(rest), rest.residual
-    )
+    made = candidates(fitter, rest, [*ent.names(rest.entries), str(name)])
+    screened = Screen(made, fitter.block, fitter.blocks, fitter.use).gains(free_columns(rest), rest.residual)
     least = NEAR * log_gain(rest.errors, chosen.errors)
     tried = [
         k for k in best([c.family for c in made], [s.gain for s in screened], 3) if screened[k].gain > least

@@ -11,7 +11,8 @@ from rtcomp.diagnosis.result import Sight
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import ForceBalance
 from rtcomp.diagnosis.second.candidates import Candidate, candidates
-from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.diagnosis.second.fit import Fitter
+from rtcomp.diagnosis.second.fitted import Fitted
 from rtcomp.diagnosis.second.regression import RIDGE
 from rtcomp.diagnosis.second.replicates import free_columns
 from rtcomp.diagnosis.second.settings import LEVEL
@@ -28,8 +29,8 @@ def sights(
     `beside` are all candidates beside the model, where they are known.
     """
     balance = fitter.balance
-    made = beside or candidates(balance, fitted, ent.names(fitted.entries))
-    use = np.isin(balance.block, np.flatnonzero(fitter.use))
+    made = beside or candidates(fitter, fitted, ent.names(fitted.entries))
+    use = fitter.rows
     model = free_columns(fitted)[:, use]
     norm = np.sqrt(np.einsum("ij,ij->i", model, model))
     model = model / np.where(norm > 0.0, norm, 1.0)[:, None]

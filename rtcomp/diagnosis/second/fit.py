@@ -9,71 +9,38 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.extend import level_and_reach
+from rtcomp.diagnosis.result import PositionFit
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import BASE, ForceBalance, System
+from rtcomp.diagnosis.second.data import Data
 from rtcomp.diagnosis.second.entries import Entry
+from rtcomp.diagnosis.second.fitted import Fitted, left_out
 from rtcomp.diagnosis.second.free import Free, Term, free_of
 from rtcomp.diagnosis.second.regression import Grams, Prior
 from rtcomp.diagnosis.second.settings import BELIEF_SD
+from rtcomp.diagnosis.second.stage_of import stage_of
+from rtcomp.diagnosis.second.where import as_force
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
+from rtcomp.physics import Effect
+from rtcomp.stage.stage import Stage
 
 STEPS = 10
 """Gauss-Newton steps at most."""
 SETTLED = 1e-4
 """Relative gain of a step below which the fit ends."""
-ONCE = 0.5
-"""Part of a column's power in one block, from which on the other blocks cannot tell its size."""
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """A model fitted on the blocks that are not reserved."""
-
-    terms: tuple[Term, ...]
-    coefficients: Floats
-    """(p,): base, then sizes of entries that add a force, in the units of the columns."""
-    system: System
-    prior: Prior
-    residual: Floats
-    """(n,), whitened, all rows."""
-    tangents: Floats
-    """(q, n): change of the model with each free nonlinear parameter (on its scale)."""
-    free: tuple[Free, ...]
-    errors: Floats
-    """(B_use,): squared error of each block left out."""
-    without: Floats
-    """(B_use, p + q): coefficients and nonlinear changes without each block."""
-    sse: float
-    """Squared error of all blocks that are not reserved, in sample."""
-    variance: float
-    weights: Floats
-    """N/m of the friction units."""
-
-    @property
-    def size(self) -> int:
-        """Number of parameters of its effects."""
-        return sum(len(t.free) for t in self.terms)
-
-    @property
-    def at_bound(self) -> bool:
-        """Tell whether a nonlinear parameter of the last term came out at its bound."""
-        last = len(self.terms) - 1
-        return any(f.at_bound(self.terms) for f in self.free if f.term == last)
-
-    @property
-    def entries(self) -> list[Entry]:
-        """Return the entries with the values found."""
-        return [t.entry for t in self.terms]
 
 
 class Fitter:
-    """Fits models of one force balance."""
+    """One objective, here the force balance: what a model leaves of it, and fits of models to it."""
+
+    gridded = True
+    """Whether friction is a grid of units, which are put to where a model has it."""
 
     def __init__(self, balance: ForceBalance) -> None:
         self.balance = balance
@@ -85,6 +52,112 @@ class Fitter:
     def use(self) -> np.ndarray:
         """Blocks to fit, (blocks,) bool: those that are not reserved."""
         return ~self.balance.reserved
+
+    @property
+    def block(self) -> np.ndarray:
+        """Block of each row of the residual, (n,), sorted."""
+        return self.balance.block
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return self.balance.blocks
+
+    @property
+    def rows(self) -> np.ndarray:
+        """Rows of the residual that are not reserved, (n,) bool."""
+        return np.asarray(self.use[self.block])
+
+    @property
+    def power(self) -> float:
+        """Squared residual of blocks that are not reserved if nothing at all were explained."""
+        return self.balance.power
+
+    def linear(self, kind: type[Effect]) -> bool:
+        """Tell whether the sizes of an effect are coefficients, so that any start value of them will do."""
+        return ent.adds_force(kind)
+
+    def judges(self, kind: type[Effect]) -> bool:
+        """Tell whether the objective can tell an effect at all."""
+        return True
+
+    def rough(self, model: Fitted, terms: Sequence[Term], count: int, ends: float) -> list[Term]:
+        """Return the `count` of `terms`, the likeliest first, that are worth a full fit beside a model."""
+        return list(terms[:count])
+
+    def units(self, entries: Sequence[Entry]) -> Floats:
+        """Return the columns (q, n) of unit sizes of the last of `entries`, which is `linear`."""
+        return self.balance.forces_of(entries)
+
+    def change(self, model: Fitted, entry: Entry) -> Floats:
+        """Return by how much more a model accounts for with an entry at work, (n,), coefficients held."""
+        b = self.balance
+        return model.residual - b.error([*model.entries, entry], model.coefficients, model.weights)
+
+    def stage(self, model: Fitted, *, between: bool = False) -> Stage:
+        """Return a model as a stage; `between`: with friction that its own grid does not quite reach."""
+        return stage_of(self.balance, model, between=between)
+
+    def force(self, model: Fitted) -> Floats:
+        """Return the force (N) that a model leaves open on the compared rows of the balance."""
+        return as_force(self.balance, model.residual)
+
+    def without(self, model: Fitted, at: int) -> Floats:
+        """Return the force (N) that a model leaves open without its effect number `at`, others as are."""
+        b = self.balance
+        others = [*model.entries[:at], *model.entries[at + 1 :]]
+        span = model.system.of_entry[len(b.believed) + at]
+        c = np.delete(model.coefficients, np.arange(span.start, span.stop))
+        return as_force(b, b.error(others, c, model.weights))
+
+    def relative(self, model: Fitted) -> float:
+        """Return what a model leaves over what there is to explain, rms of both, without the reserved."""
+        rows = ~self.balance.reserved[self.balance.block]
+        power = float(np.mean(self.balance.drive_force()[rows] ** 2))
+        return float(np.sqrt(np.mean(self.force(model)[rows] ** 2) / max(power, 1e-300)))
+
+    def relative_of(self, stage: Stage) -> float:
+        """Return the same of any stage as it is."""
+        drive, needed = self.balance.both_sides(stage)
+        rows = ~self.balance.reserved[self.balance.block]
+        power = float(np.mean(drive[rows] ** 2))
+        return float(np.sqrt(np.mean((drive - needed)[rows] ** 2) / max(power, 1e-300)))
+
+    def has_offset(self, model: Fitted) -> bool:
+        """Tell whether a model has a constant force beside its entries."""
+        return bool(model.coefficients[self.balance.size - 1] != 0.0)
+
+    def above_noise(self, model: Fitted) -> float:
+        """Return that relative error (rms) as far as the sensor's noise does not account for it."""
+        power = float(np.mean(self.balance.drive_force() ** 2))
+        noise = self.balance.noise_power / max(power, 1e-300)
+        return float(np.sqrt(max(self.relative(model) ** 2 - noise, 0.0)))
+
+    def numbers(self, model: Fitted, *, effects: bool) -> tuple[Floats, Floats, Floats]:
+        """Return mass, damping, level and reach of friction, and sizes of believed `effects` by amount.
+
+        Those of the model, (q,), without each block, (B_use, q), and the believed sizes with their signs.
+        """
+        b = self.balance
+        sizes = np.concatenate([np.zeros(0), *(ent.sizes_of(e) for e in b.believed if effects)])
+        own = slice(b.size, b.size + sizes.size)
+        sign = np.where(sizes < 0.0, -1.0, 1.0)
+
+        def of(c: Floats) -> Floats:
+            elements = list(zip(c[b.friction], b.reaches, strict=True))
+            return np.array([*c[: len(BASE)], *level_and_reach(elements), *(sign * c[own])])
+
+        return of(model.coefficients), np.array([of(c) for c in model.without]), sizes
+
+    def position(self, before: Stage, retuned: Stage, after: Stage, seed: int) -> PositionFit | None:
+        """Return errors of position on the reserved part; None where forces judge."""
+        return None
+
+    def on(self, data: Data) -> Fitter:
+        """Return the same objective on other data of equal length: a replicate."""
+        other = Fitter(self.balance.on(data))
+        other.offset = self.offset
+        return other
 
     def prior(self, system: System, terms: Sequence[Term]) -> Prior:
         """Return what is believed of the columns: mass, damping near the belief, no negative stiffness."""
@@ -166,8 +239,7 @@ class Fitter:
                 moved = joint.solve(self.use, Prior(wide.mean, held, wide.low, wide.high), variance)[c.size :]
                 trial = list(current)
                 for f, step in zip(free, moved.tolist(), strict=True):
-                    most = 0.7 if f.log else max(0.5 * abs(f.get(current)), 20.0 * f.step)
-                    f.put(trial, f.get(current) + min(max(step, -most), most))
+                    f.put(trial, f.get(current) + min(max(step, -f.most(current)), f.most(current)))
                 try:
                     found = self.solve(trial, weights, variance)
                 except ConfigError:
@@ -245,29 +317,3 @@ def _newly_behind(terms: Sequence[Term], start: Fitted) -> bool:
     return any(ent.kind_of(t.entry).behind for t in terms) and not any(
         ent.kind_of(t.entry).behind for t in start.terms
     )
-
-
-def left_out(
-    grams: Grams, use: np.ndarray, prior: Prior, variance: float, whole: Floats
-) -> tuple[Floats, Floats]:
-    """Return squared errors (B_use,) of blocks predicted by the others, and coefficients without each.
-
-    What happens in one block only keeps the size that it has in the `whole` fit there: other blocks cannot
-    tell it.
-    """
-    members = np.flatnonzero(use)
-    power = np.einsum("kii->ki", grams.gram[use])
-    alone = power > ONCE * np.maximum(power.sum(axis=0), 1e-300)
-    errors, found = np.empty(members.size), []
-    for i, k in enumerate(members):
-        others = use.copy()
-        others[k] = False
-        held = prior
-        if alone[i].any():
-            low, high = prior.low.copy(), prior.high.copy()
-            low[alone[i]] = high[alone[i]] = whole[alone[i]]
-            held = Prior(prior.mean, prior.precision, low, high)
-        c = grams.solve(others, held, variance)
-        errors[i] = grams.errors(c, np.array([k]))[0]
-        found.append(c)
-    return errors, np.array(found)

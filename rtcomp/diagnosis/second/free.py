@@ -50,6 +50,10 @@ class Free:
         value = float(terms[self.term].entry[self.name])
         return math.log(value) if self.log else value
 
+    def most(self, terms: Sequence[Term]) -> float:
+        """Return the furthest that one step of a fit may move it."""
+        return 0.7 if self.log else max(0.5 * abs(self.get(terms)), 20.0 * self.step)
+
     def at_bound(self, terms: Sequence[Term]) -> bool:
         """Tell whether it is as large or as small as it may be."""
         value = float(terms[self.term].entry[self.name])
@@ -65,12 +69,22 @@ class Free:
 
 def free_of(terms: Sequence[Term], balance: ForceBalance) -> list[Free]:
     """Return the nonlinear parameters of `terms` that a fit moves, within what the recording could show."""
+    return _free_of(terms, balance, sizes=False)
+
+
+def all_free_of(terms: Sequence[Term], balance: ForceBalance) -> list[Free]:
+    """Return all parameters of `terms` that a fit moves where none is linear."""
+    return _free_of(terms, balance, sizes=True)
+
+
+def _free_of(terms: Sequence[Term], balance: ForceBalance, *, sizes: bool) -> list[Free]:
     low, high = balance.data.stroke
     found = []
     for i, term in enumerate(terms):
         kind = ent.kind_of(term.entry)
         waves = any(p.unit == ent.PHASE and p.name in term.entry for p in kind.parameters)
-        for p in ent.free_parameters(term.entry, linear=False):
+        own = ent.free_parameters(term.entry, linear=True) if sizes else []
+        for p in [*own, *ent.free_parameters(term.entry, linear=False)]:
             if p.name not in term.free:
                 continue
             value, least, most = float(term.entry[p.name]), p.lowest, p.high

@@ -9,11 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rtcomp.diagnosis.certain import MODEL, Numbers, elsewhere, scatter
-from rtcomp.diagnosis.extend import level_and_reach
 from rtcomp.diagnosis.result import Value
 from rtcomp.diagnosis.second import entries as ent
-from rtcomp.diagnosis.second.balance import BASE, ForceBalance
-from rtcomp.diagnosis.second.fit import ONCE, Fitted, left_out
+from rtcomp.diagnosis.second.fit import Fitter
+from rtcomp.diagnosis.second.fitted import ONCE, Fitted, left_out
 from rtcomp.diagnosis.second.regression import Grams
 from rtcomp.kernels import Floats
 from rtcomp.stage.stage import Stage
@@ -34,7 +33,7 @@ class Told:
     """Parameters that are at a physical bound."""
 
 
-def told(balance: ForceBalance, fitted: Fitted) -> list[Told]:
+def told(fitter: Fitter, fitted: Fitted) -> list[Told]:
     """Return the 95 % intervals of each term's parameters.
 
     Blocks of the recording are left out in turn (delete-a-group jackknife: Bell and McCaffrey 2002, Survey
@@ -42,14 +41,15 @@ def told(balance: ForceBalance, fitted: Fitted) -> list[Told]:
     """
     from scipy.stats import t as student
 
+    balance = fitter.balance
     spans = fitted.system.of_entry[len(balance.believed) :]
     factor = float(student.ppf(0.975, max(fitted.without.shape[0] - 1, 1)))
     axis = balance.stage.axis
     found = []
-    held = _shapes_held(balance, fitted)
+    held = _shapes_held(fitter, fitted)
     for i, (term, span) in enumerate(zip(fitted.terms, spans, strict=True)):
         kind = ent.kind_of(term.entry)
-        without, once = _without(fitted, i, span), _once(balance, fitted, i, span)
+        without, once = _without(fitted, i, span), _once(fitter, fitted, i, span)
         alone = _without(held, i, span)
         values, neutral, bound = {}, [], []
         for p in kind.parameters:
@@ -83,15 +83,15 @@ def _deviation(without: Floats) -> float:
     return float(np.sqrt(max(scatter(without[:, None])[0, 0], 0.0)))
 
 
-def _shapes_held(balance: ForceBalance, fitted: Fitted) -> Fitted:
+def _shapes_held(fitter: Fitter, fitted: Fitted) -> Fitted:
     """Return the fit with only the sizes of its effects free: what is nothing has no shape."""
     sizes = [k for k, f in enumerate(fitted.free) if f.name in ent.kind_of(fitted.entries[f.term]).linear]
     tangents = fitted.tangents[sizes]
     joint = np.concatenate([fitted.system.columns, tangents])
-    grams = Grams.of(joint, fitted.system.y, balance.block, balance.blocks)
+    grams = Grams.of(joint, fitted.system.y, fitter.block, fitter.blocks)
     wide = fitted.prior.extended(np.full(len(sizes), -np.inf), np.full(len(sizes), np.inf))
     whole = np.concatenate([fitted.coefficients, np.zeros(len(sizes))])
-    _, without = left_out(grams, ~balance.reserved, wide, fitted.variance, whole)
+    _, without = left_out(grams, fitter.use, wide, fitted.variance, whole)
     free = tuple(fitted.free[k] for k in sizes)
     return replace(fitted, tangents=tangents, free=free, without=without)
 
@@ -119,14 +119,14 @@ def _without(fitted: Fitted, at: int, span: slice) -> dict[str, Floats]:
     return found
 
 
-def _once(balance: ForceBalance, fitted: Fitted, at: int, span: slice) -> dict[str, float]:
+def _once(fitter: Fitter, fitted: Fitted, at: int, span: slice) -> dict[str, float]:
     """Return standard deviations of numbers that one block alone tells."""
-    use = np.isin(balance.block, np.flatnonzero(~balance.reserved))
-    block, rest = balance.block[use], fitted.residual[use]
+    use = fitter.rows
+    block, rest = fitter.block[use], fitted.residual[use]
     found: dict[str, float] = {}
 
     def alone(column: Floats) -> bool:
-        power = np.bincount(block, column**2, balance.blocks)
+        power = np.bincount(block, column**2, fitter.blocks)
         return bool(power.max() > ONCE * max(float(power.sum()), 1e-300))
 
     own = [n for n in ent.kind_of(fitted.terms[at].entry).linear if n in fitted.terms[at].entry]
@@ -140,29 +140,19 @@ def _once(balance: ForceBalance, fitted: Fitted, at: int, span: slice) -> dict[s
     return found
 
 
-def numbers(balance: ForceBalance, believed: Stage, fitted: Fitted, *, effects: bool = False) -> Numbers:
+def numbers(fitter: Fitter, believed: Stage, fitted: Fitted, *, effects: bool = False) -> Numbers:
     """Return mass, damping, level and reach of friction, believed and found, with their half widths.
 
     With `effects`, the sizes of forces that believed effects add as well, by amount.
     """
     from scipy.stats import t as student
 
-    reaches = balance.reaches
-    sizes = np.concatenate([np.zeros(0), *(ent.sizes_of(e) for e in balance.believed if effects)])
-    own = slice(balance.size, balance.size + sizes.size)
-    sign = np.where(sizes < 0.0, -1.0, 1.0)
-
-    def of(c: Floats) -> Floats:
-        elements = list(zip(c[balance.friction], reaches, strict=True))
-        return np.array([*c[: len(BASE)], *level_and_reach(elements), *(sign * c[own])])
-
-    values = of(fitted.coefficients)
-    sets = np.array([of(c) for c in fitted.without])
+    values, sets, sizes = fitter.numbers(fitted, effects=effects)
     spread = np.maximum(np.diag(scatter(sets)), 0.0)
     factor = float(student.ppf(0.975, max(sets.shape[0] - 1, 1)))
     half = np.sqrt(factor**2 * spread + (MODEL * values) ** 2)
     m = believed.mechanics
-    before = np.array([m.mass, m.viscous, m.micro_damping, *_friction(believed), *(sign * sizes)])
+    before = np.array([m.mass, m.viscous, m.micro_damping, *_friction(believed), *np.abs(sizes)])
     return Numbers(before, values, half, np.zeros(values.size))
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rtcomp.diagnosis.by_position.sticking import MUCH, mostly_hidden
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.result import Diagnosis, Place
 from rtcomp.diagnosis.second.answer import answer
@@ -15,10 +16,12 @@ from rtcomp.diagnosis.second.balance import ForceBalance
 from rtcomp.diagnosis.second.baseline import baseline, settle, with_offset
 from rtcomp.diagnosis.second.confidence import alternatives
 from rtcomp.diagnosis.second.data import load_data
-from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.diagnosis.second.fit import Fitter
+from rtcomp.diagnosis.second.fitted import Fitted
 from rtcomp.diagnosis.second.noise import Noise
 from rtcomp.diagnosis.second.selection import Look, Search, look, search
 from rtcomp.diagnosis.second.settings import BUDGET
+from rtcomp.diagnosis.second.trajectory import Trajectory
 from rtcomp.diagnosis.second.validation import Reserved
 from rtcomp.diagnosis.second.where import Compared, as_force
 from rtcomp.errors import RtcompError
@@ -26,9 +29,15 @@ from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
 
 Progress = Callable[[float, str], None]
+STICKS = (
+    "the axis sticks finer than a count of its sensor in {:.0f} % of the rows, where motion tells nothing of "
+    "friction: judged by position, simulated over {:.2g} s from points of the recording"
+)
 SEARCH, TELL_APART = 0.75, 0.9
 """Parts of the budget at which the search ends, and what then tells its models apart."""
 BAND_LIMITED = "the command is taken as band-limited between rows, which fits better than held"
+LOUD = 0.03
+"""Relative force error of noise alone, from which on forces do not judge an axis that mostly sticks."""
 Located = Callable[[float, Sequence[Place]], None]
 """Told, before anything is named, what part of the force the refitted stage leaves open (rms), and where."""
 
@@ -79,6 +88,9 @@ def _diagnosed(
         left = (base.sse / max(balance.power, 1e-300)) ** 0.5
         located(left, locate(view, before, None, seed, stage.axis))
     say(1.0, "balance")
+    unseen = mostly_hidden(stage, recordings)
+    if unseen > MUCH and _loud(balance):
+        objectives = [_by_trajectory(objectives[0])]
     fitter, found = _searched(objectives, ends - (1.0 - SEARCH) * budget, say, seed)
     say(0.0, "tell apart")
     sets = alternatives(fitter, found, ends - (1.0 - TELL_APART) * budget)
@@ -88,8 +100,24 @@ def _diagnosed(
     done = answer(stage, fitter, found, sets, reserved, seed, late=time.monotonic() > ends)
     say(1.0, "judge")
     notes = [BAND_LIMITED] if len(objectives) > 1 and not fitter.balance.data.held else []
+    notes += [STICKS.format(100.0 * unseen, done.position.seconds)] if done.position is not None else []
     notes += [f"not tried within {budget:g} s: {what}" for what in found.not_tried]
     return replace(done, notes=[*notes, *done.notes], not_tried=found.not_tried)
+
+
+def _loud(balance: ForceBalance) -> bool:
+    """Tell whether noise alone leaves so much force that it is no judge of an axis that mostly sticks."""
+    rows = ~balance.reserved[balance.block]
+    return balance.noise_power > LOUD**2 * float(np.mean(balance.drive_force()[rows] ** 2))
+
+
+def _by_trajectory(by_force: Objective) -> Objective:
+    """Return the objective that judges by simulated position, on the same blocks."""
+    believed = by_force.balance.stage
+    if believed.friction is None:
+        believed = by_force.fitter.stage(by_force.base)
+    fitter = Trajectory.of(by_force.balance, believed)
+    return Objective(fitter, fitter.fit([]))
 
 
 @dataclass(frozen=True)
@@ -124,7 +152,7 @@ def _objectives(stage: Stage, recordings: Sequence[Recording], held: bool | None
         made.append(Objective(fitter, with_offset(fitter, base)))
     if len(made) == 1:
         return made
-    looked = [replace(one, first=look(one.balance, one.base)) for one in made]
+    looked = [replace(one, first=look(one.fitter, one.base)) for one in made]
     return sorted(looked, key=_left_beside)
 
 

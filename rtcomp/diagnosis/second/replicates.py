@@ -8,15 +8,14 @@ import numpy as np
 
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.second import entries as ent
-from rtcomp.diagnosis.second.balance import ForceBalance
 from rtcomp.diagnosis.second.candidates import candidates
-from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.diagnosis.second.fit import Fitter
+from rtcomp.diagnosis.second.fitted import Fitted
 from rtcomp.diagnosis.second.noise import Noise
 from rtcomp.diagnosis.second.replicate import replicate
 from rtcomp.diagnosis.second.screening import Screen
 from rtcomp.diagnosis.second.settings import REPLICATES
 from rtcomp.diagnosis.second.significance import Null
-from rtcomp.diagnosis.second.stage_of import stage_of
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
@@ -32,17 +31,18 @@ def free_columns(fitted: Fitted) -> Floats:
     return np.concatenate([fitted.system.columns[free], fitted.tangents])
 
 
-def null_of(balance: ForceBalance, fitted: Fitted, screen: Screen, gain: float, seed: int) -> Null:
+def null_of(fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: int) -> Null:
     """Return the null distribution beside a fitted model.
 
     Replicates are drawn until it is plain whether `gain` and the error of the fit are beyond them: sequential
     Monte Carlo (Besag and Clifford 1991, Biometrika 78(2)). A model that cannot be kept on the recorded
     motion is judged by surrogates of its residual instead.
     """
+    balance = fitter.balance
     try:
-        stage = stage_of(balance, fitted, between=True)
+        stage = fitter.stage(fitted, between=True)
     except ConfigError:
-        return _surrogates(balance, fitted, screen, seed)
+        return _surrogates(fitter, fitted, screen, seed)
     motion = [p.x for p in balance.paths()]
     recorded = balance.data.as_recorded()
     noise = balance.noise.rms if balance.data.averaged == 1 else Noise.of(stage, recorded).rms
@@ -53,32 +53,30 @@ def null_of(balance: ForceBalance, fitted: Fitted, screen: Screen, gain: float, 
         data = replicate(stage, balance.data, motion, noise, 1000 * seed + number)
         if data is None:
             return None
-        other = balance.on(data)
-        fitter = Fitter(other)
-        fitter.offset = fitted.coefficients[balance.size - 1] != 0.0
-        again = fitter.fit(list(fitted.terms), fitted, steps=0)
+        other = fitter.on(data)
+        again = other.fit(list(fitted.terms), fitted, steps=0)
         gains = screen.gains(free_columns(again), again.residual)
         # Its own size is all that a single event has: the largest of these residuals, not of the recorded.
         made = candidates(other, again, names, events=True) if events else []
         if made:
-            gains += Screen(made, other.block, other.blocks, ~other.reserved).gains(
+            gains += Screen(made, other.block, other.blocks, other.use).gains(
                 free_columns(again), again.residual
             )
-        scale = balance.power / max(other.power, 1e-300)
+        scale = fitter.power / max(other.power, 1e-300)
         return max((s.gain for s in gains), default=0.0), float(again.errors.sum()) * scale
 
     found: list[tuple[float, float]] = []
     for first, last in ((0, FEW), (FEW, REPLICATES)):
         found += [f for f in shared(one, range(first, last)) if f is not None]
         if len(found) < FEW // 2:
-            return _surrogates(balance, fitted, screen, seed)
+            return _surrogates(fitter, fitted, screen, seed)
         null = Null(*np.array(found).T)
         if null.plain(gain, float(fitted.errors.sum())):
             break
     return null
 
 
-def _surrogates(balance: ForceBalance, fitted: Fitted, screen: Screen, seed: int) -> Null:
+def _surrogates(fitter: Fitter, fitted: Fitted, screen: Screen, seed: int) -> Null:
     """Return the null distribution of residuals of the same spectrum that know nothing of the motion.
 
     Phases are drawn anew (Theiler and others 1992, Physica D 58). The error that noise alone leaves is that
@@ -93,7 +91,7 @@ def _surrogates(balance: ForceBalance, fitted: Fitted, screen: Screen, seed: int
         gains = screen.gains(columns, np.fft.irfft(turned, fitted.residual.size))
         return max((s.gain for s in gains), default=0.0)
 
-    rows = float(np.count_nonzero(~balance.reserved[balance.block]))
+    rows = float(np.count_nonzero(fitter.rows))
     chance = random.normal(1.0, np.sqrt(2.0 / rows), FEW)
     return Null(np.array([one(k) for k in range(FEW)]), rows * chance)
 

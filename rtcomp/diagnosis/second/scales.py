@@ -15,8 +15,9 @@ import numpy as np
 from rtcomp.diagnosis.periodogram import highest, periodogram
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import ForceBalance
-from rtcomp.diagnosis.second.fit import Fitted
-from rtcomp.diagnosis.second.where import as_force
+from rtcomp.diagnosis.second.fit import Fitter
+from rtcomp.diagnosis.second.fitted import Fitted
+from rtcomp.diagnosis.second.where import as_white
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Parameter
 
@@ -42,8 +43,9 @@ class Scales:
     moments: Floats
 
     @classmethod
-    def of(cls, balance: ForceBalance, fitted: Fitted) -> Scales:
+    def of(cls, fitter: Fitter, fitted: Fitted) -> Scales:
         """Measure them on the compared rows and on the residual of a fit."""
+        balance = fitter.balance
         data, paths = balance.data, balance.paths()
         v = np.abs(balance.plain([p.v for p in paths]))
         u = np.abs(balance.plain([s.voltage for s in data.segments]))
@@ -53,7 +55,8 @@ class Scales:
         moving = v[v > 1e-3 * v.max()] if v.max() > 0 else v
         slow, fast = (max(float(np.quantile(moving, q)), 1e-12) for q in (0.02, 0.9))
         speed = np.geomspace(slow, fast, POINTS)
-        rest = fitted.residual * np.isin(balance.block, np.flatnonzero(~balance.reserved))
+        force = fitter.force(fitted) * ~balance.reserved[balance.block]
+        rest = as_white(balance, force)
         return cls(
             (max(2.0 * balance.grain, 1e-5 * (high - low)), 0.5 * (high - low)),
             (low, high),
@@ -61,8 +64,8 @@ class Scales:
             np.unique(np.quantile(u[u > 0], quantiles)) if np.any(u > 0) else np.ones(1),
             (data.period, data.seconds),
             (4.0 / data.seconds, min(0.4 * data.rate, balance.noise.bandwidth)),
-            float(np.sqrt(np.mean(as_force(balance, rest) ** 2))),
-            _periods(balance, rest),
+            float(np.sqrt(np.mean(force**2))),
+            _periods(balance, force, rest),
             _tones(balance, rest),
             _moments(balance, rest),
         )
@@ -108,13 +111,12 @@ def _listed(values: Floats) -> list[float]:
     return [float(value) for value in values]
 
 
-def _periods(balance: ForceBalance, residual: Floats) -> Floats:
+def _periods(balance: ForceBalance, force: Floats, residual: Floats) -> Floats:
     """Return periods (m) of waves along the position, in the residual as force and as displacement."""
     paths = balance.paths()
     x = balance.plain([p.x for p in paths])
     v = balance.plain([p.v for p in paths])
     u = balance.plain([s.voltage for s in balance.data.segments])
-    force = as_force(balance, residual)
     span = float(np.ptp(x))
     step = float(np.median(np.abs(np.diff(x)))) or span / 1000.0
     most = float(np.clip(span / max(2.0 * step, 4.0 * balance.grain, 1e-4 * span), 4.0, 1500.0))

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from rtcomp.diagnosis.second.candidates import Candidate
-from rtcomp.diagnosis.second.fit import ONCE
+from rtcomp.diagnosis.second.fitted import ONCE
 from rtcomp.diagnosis.second.regression import RIDGE
 from rtcomp.kernels import Floats
 

@@ -11,17 +11,16 @@ import numpy as np
 
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.second import entries as ent
-from rtcomp.diagnosis.second.balance import ForceBalance
 from rtcomp.diagnosis.second.baseline import settle
 from rtcomp.diagnosis.second.candidates import Candidate, candidates, started
-from rtcomp.diagnosis.second.fit import Fitted, Fitter
+from rtcomp.diagnosis.second.fit import Fitter
+from rtcomp.diagnosis.second.fitted import Fitted
 from rtcomp.diagnosis.second.free import Term
 from rtcomp.diagnosis.second.intervals import told
 from rtcomp.diagnosis.second.replicates import best, free_columns, null_of
 from rtcomp.diagnosis.second.screening import Screen, Screened
 from rtcomp.diagnosis.second.settings import BEAM, FULL_FITS, LEAST_GAIN, LEVEL, MOST_EFFECTS, NEGLIGIBLE
 from rtcomp.diagnosis.second.significance import Null, log_gain
-from rtcomp.diagnosis.second.where import above_noise, relative_error
 from rtcomp.errors import ConfigError
 
 SCANNED = 14
@@ -79,7 +78,7 @@ def search(
         while beam and judged is None:
             late = step > 0 and time.monotonic() > ends
             at_hand = first if step == 0 else None
-            seen = _judged(fitter.balance, beam[0], seed + step, say, at_hand, late=late)
+            seen = _judged(fitter, beam[0], seed + step, say, at_hand, late=late)
             judged = _sound(seen, parents[id(beam[0])])
             if judged is None:
                 beam.pop(0)
@@ -91,7 +90,7 @@ def search(
         if step == 0:
             found.screened = _table(judged.candidates, judged.screened, null)
         done = null.settled(judged.gain, float(beam[0].errors.sum()), LEVEL)
-        if done or step == MOST_EFFECTS or _exhausted(fitter.balance, beam[0], everything):
+        if done or step == MOST_EFFECTS or _exhausted(fitter, beam[0], everything):
             break
         if time.monotonic() > ends:
             found.not_tried.append(_further(found.chosen))
@@ -106,11 +105,11 @@ def search(
             if short:
                 break
             began = moment
-            beside = look(fitter.balance, other)
+            beside = look(fitter, other)
             grown += _grow(fitter, other, beside.candidates, beside.screened, ends)
         if short:
             found.not_tried.append(f"some of {_further(found.chosen)}")
-        accepted = [g for g in grown if _accepted(fitter.balance, g, _parent(g, beam), null, everything)]
+        accepted = [g for g in grown if _accepted(fitter, g, _parent(g, beam), null, everything)]
         accepted = _distinct(sorted(accepted, key=_score))[:BEAM]
         parents = {}
         next_beam = []
@@ -155,13 +154,13 @@ def doubts(fitter: Fitter, found: Search) -> list[str]:
     """
     chosen, null = found.chosen, found.null
     said = []
-    for i, span in enumerate(told(fitter.balance, chosen)):
+    for i, span in enumerate(told(fitter, chosen)):
         why = "its size may be nothing" if span.nothing else ""
         why = f"{', '.join(span.bound)} at its bound" if span.bound else why
         if not why and null is not None and null.p_of_error(float(chosen.errors.sum())) < LEVEL:
             without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
-            left = above_noise(fitter.balance, chosen) ** 2
-            explained = above_noise(fitter.balance, without) ** 2 - left
+            left = fitter.above_noise(chosen) ** 2
+            explained = fitter.above_noise(without) ** 2 - left
             why = "more is left than it explains" if left > explained else ""
         said.append(why)
     return said
@@ -198,16 +197,14 @@ class Look:
         return max((s.gain for s in self.screened), default=0.0)
 
 
-def look(balance: ForceBalance, model: Fitted) -> Look:
+def look(fitter: Fitter, model: Fitted) -> Look:
     """Look at all candidates beside a model, without their null distribution."""
-    made = candidates(balance, model, ent.names(model.entries))
-    screen = Screen(made, balance.block, balance.blocks, ~balance.reserved)
+    made = candidates(fitter, model, ent.names(model.entries))
+    screen = Screen(made, fitter.block, fitter.blocks, fitter.use)
     return Look(made, screen.gains(free_columns(model), model.residual), screen, None)
 
 
-def _judged(
-    balance: ForceBalance, model: Fitted, seed: int, say: Say, first: Look | None, *, late: bool
-) -> Look:
+def _judged(fitter: Fitter, model: Fitted, seed: int, say: Say, first: Look | None, *, late: bool) -> Look:
     """Return the look beside a model with its null distribution.
 
     `first` is that look, where it was taken before; where it is too `late` for one, only what chance leaves
@@ -217,10 +214,10 @@ def _judged(
     what = f"beside {' and '.join(names)}" if names else "search"
     say(0.0, what)
     if late:
-        first = Look([], [], Screen([], balance.block, balance.blocks, ~balance.reserved), None)
-    seen = first or look(balance, model)
+        first = Look([], [], Screen([], fitter.block, fitter.blocks, fitter.use), None)
+    seen = first or look(fitter, model)
     say(0.5, what)
-    return replace(seen, null=null_of(balance, model, seen.screen, seen.gain, seed))
+    return replace(seen, null=null_of(fitter, model, seen.screen, seen.gain, seed))
 
 
 def _sound(seen: Look, parent: float) -> Look | None:
@@ -238,10 +235,10 @@ def _grow(
     fitter: Fitter, model: Fitted, made: Sequence[Candidate], screened: Sequence[Screened], ends: float
 ) -> list[Fitted]:
     """Return the model with each of the best candidates, fitted in full."""
-    chosen = best([c.family for c in made], [s.gain for s in screened], FULL_FITS)
-    terms = [started(made[i], screened[i].sizes) for i in chosen]
+    order = best([c.family for c in made], [s.gain for s in screened], len(made))
+    terms = fitter.rough(model, [started(made[i], screened[i].sizes) for i in order], FULL_FITS, ends)
     # First order is no guide to what is behind a play: its own motion is followed from place to place.
-    behind = {c.name: c.term for c in made if ent.kind_of(c.term.entry).behind}
+    behind = {c.name: c.term for c in made if fitter.gridded and ent.kind_of(c.term.entry).behind}
     terms = [t for t in terms if t.entry["name"] not in behind]
     terms += [t for t in (_scanned(fitter, model, term, ends) for term in behind.values()) if t is not None]
 
@@ -281,9 +278,7 @@ def _scanned(fitter: Fitter, model: Fitted, term: Term, ends: float) -> Term | N
     return term.with_entry({**term.entry, name: value})
 
 
-def _accepted(
-    balance: ForceBalance, model: Fitted, parent: Fitted, null: Null | None, everything: float
-) -> bool:
+def _accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, everything: float) -> bool:
     """Tell whether the last effect of a model passes the one test and matters."""
     if null is None or model.at_bound:
         return False
@@ -291,13 +286,13 @@ def _accepted(
     gained = math.sqrt(parent.errors.sum()) - math.sqrt(model.errors.sum())
     if p >= LEVEL or gained <= LEAST_GAIN * math.sqrt(everything):
         return False
-    return relative_error(balance, parent) ** 2 - relative_error(balance, model) ** 2 > NEGLIGIBLE**2
+    return fitter.relative(parent) ** 2 - fitter.relative(model) ** 2 > NEGLIGIBLE**2
 
 
-def _exhausted(balance: ForceBalance, model: Fitted, everything: float) -> bool:
+def _exhausted(fitter: Fitter, model: Fitted, everything: float) -> bool:
     """Tell whether a model leaves too little for any further effect to matter."""
     little = math.sqrt(model.errors.sum()) <= LEAST_GAIN * math.sqrt(everything)
-    return little or relative_error(balance, model) <= NEGLIGIBLE
+    return little or fitter.relative(model) <= NEGLIGIBLE
 
 
 def _parent(model: Fitted, beam: Sequence[Fitted]) -> Fitted:
@@ -311,7 +306,7 @@ def _pruned(fitter: Fitter, model: Fitted, null: Null | None, everything: float,
         smaller = [
             fitter.fit([*model.terms[:i], *model.terms[i + 1 :]], model) for i in range(len(model.terms))
         ]
-        rest = [s for s in smaller if not _accepted(fitter.balance, model, s, null, everything)]
+        rest = [s for s in smaller if not _accepted(fitter, model, s, null, everything)]
         if not rest:
             return model
         model = min(rest, key=_score)

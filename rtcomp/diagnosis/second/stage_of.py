@@ -11,7 +11,7 @@ from rtcomp.diagnosis.extend import with_forces as scaled
 from rtcomp.diagnosis.second import entries as ent
 from rtcomp.diagnosis.second.balance import BASE, ForceBalance
 from rtcomp.diagnosis.second.entries import Entry
-from rtcomp.diagnosis.second.fit import Fitted
+from rtcomp.diagnosis.second.fitted import Fitted
 from rtcomp.kernels import Floats
 from rtcomp.physics import catalogue
 from rtcomp.stage.stage import Stage

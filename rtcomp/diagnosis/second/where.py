@@ -11,8 +11,8 @@ from rtcomp.diagnosis.curves import Curve, curve_of
 from rtcomp.diagnosis.locate import axes_of
 from rtcomp.diagnosis.second.balance import ForceBalance
 from rtcomp.diagnosis.second.data import Segment
-from rtcomp.diagnosis.second.fit import Fitted
-from rtcomp.diagnosis.second.spectrum import filtered
+from rtcomp.diagnosis.second.entries import Entry
+from rtcomp.diagnosis.second.spectrum import Response, filtered
 from rtcomp.kernels import Floats
 
 
@@ -63,47 +63,37 @@ class Compared:
 
 def as_force(balance: ForceBalance, residual: Floats) -> Floats:
     """Return a whitened residual (n,) as a force (N): its spectrum coloured again."""
+    return _weighed(balance, residual, lambda frequency: np.asarray(1.0 / balance.whitening.white(frequency)))
+
+
+def as_white(balance: ForceBalance, force: Floats) -> Floats:
+    """Return a force (N, (n,)) on the compared rows as a whitened residual: the inverse of `as_force`."""
+    return _weighed(balance, force, balance.whitening.white)
+
+
+def _weighed(balance: ForceBalance, signal: Floats, response: Response) -> Floats:
     white = balance.whitening
-    rate = balance.data.rate / white.thinning
-
-    def back(frequency: Floats) -> Floats:
-        return np.asarray(1.0 / white.white(frequency))
-
     out, at = [], 0
     for s in balance.data.segments:
         count = s.time[white.rows(s)].size
-        out.append(filtered(residual[at : at + count], rate, back, noisy=True))
+        out.append(
+            filtered(signal[at : at + count], balance.data.rate / white.thinning, response, noisy=True)
+        )
         at += count
     return np.concatenate(out)
 
 
-def relative_error(balance: ForceBalance, fitted: Fitted) -> float:
-    """Return the force that a fit leaves over that of the drive (rms, N), without the reserved blocks."""
-    rows = ~balance.reserved[balance.block]
-    left = as_force(balance, fitted.residual)
-    power = float(np.mean(balance.drive_force()[rows] ** 2))
-    return float(np.sqrt(np.mean(left[rows] ** 2) / max(power, 1e-300)))
+def curves(
+    balance: ForceBalance, entries: Sequence[Entry], rest: Floats, without: Sequence[Floats]
+) -> list[Curve | None]:
+    """Return the curve of each of `entries`, beside the others: its force along what it follows most.
 
-
-def above_noise(balance: ForceBalance, fitted: Fitted) -> float:
-    """Return the relative force error (rms) that the sensor's noise does not account for."""
-    power = float(np.mean(balance.drive_force() ** 2))
-    noise = balance.noise_power / max(power, 1e-300)
-    return float(np.sqrt(max(relative_error(balance, fitted) ** 2 - noise, 0.0)))
-
-
-def curves(balance: ForceBalance, fitted: Fitted) -> list[Curve | None]:
-    """Return the curve of each effect of a fit, beside the others: its force along what it follows most."""
+    `rest` (N, (n,)) is the force that all leave open, `without` that of all but each.
+    """
     looked = axes_of(Compared(balance), balance.stage.axis)
-    rest = as_force(balance, fitted.residual)
     found: list[Curve | None] = []
-    for i, entry in enumerate(fitted.entries):
-        others = [*fitted.entries[:i], *fitted.entries[i + 1 :]]
-        spans = fitted.system.of_entry
-        span = spans[len(balance.believed) + i]
-        c = np.delete(fitted.coefficients, np.arange(span.start, span.stop))
-        without = as_force(balance, balance.error(others, c, fitted.weights))
-        force = without - rest
+    for entry, open_force in zip(entries, without, strict=True):
+        force = open_force - rest
         drawn = np.isfinite(force).all() and bool(np.any(force))
-        found.append(curve_of(looked, entry, force, without) if drawn else None)
+        found.append(curve_of(looked, entry, force, open_force) if drawn else None)
     return found
