@@ -29,7 +29,7 @@ from rtcomp.diagnosis.second.regression import Grams, Prior
 from rtcomp.diagnosis.second.replicate import replicate
 from rtcomp.diagnosis.second.settings import BELIEF_SD
 from rtcomp.diagnosis.second.stage_of import merged
-from rtcomp.diagnosis.second.windows import Windows
+from rtcomp.diagnosis.second.windows import GROUPS, Windows
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place
@@ -76,14 +76,14 @@ class Trajectory(Fitter):
         self._rows = windows.rows
         self._own = [dict(e) for e in stage.mechanics.effects if _sized(dict(e))]
         self.numbers_moved = self._numbers()
-        moved = windows.moved()[~balance.reserved[windows.block]]
+        moved = windows.moved()[windows.block < GROUPS]
         self._power = float(np.sum((moved / scale) ** 2))
 
     @classmethod
     def of(cls, balance: ForceBalance, stage: Stage) -> Trajectory:
         """Take the usual error of `stage` as what is far."""
         windows = Windows.of(balance)
-        off = np.abs(windows.off(stage)[~balance.reserved[windows.block]])
+        off = np.abs(windows.off(stage)[windows.block < GROUPS])
         return cls(balance, stage, windows, max(float(np.median(off)), balance.noise.rms, 1e-300))
 
     # -- what an objective is -----------------------------------------------------------------------------
@@ -92,6 +92,16 @@ class Trajectory(Fitter):
     def block(self) -> np.ndarray:
         """See `Fitter`."""
         return np.repeat(self.windows.block, self._rows)
+
+    @property
+    def blocks(self) -> int:
+        """See `Fitter`: groups, and the reserved windows."""
+        return GROUPS + 1
+
+    @property
+    def use(self) -> np.ndarray:
+        """See `Fitter`."""
+        return np.arange(GROUPS + 1) < GROUPS
 
     @property
     def power(self) -> float:
@@ -198,7 +208,7 @@ class Trajectory(Fitter):
 
     def position(self, before: Stage, retuned: Stage, after: Stage, seed: int) -> PositionFit | None:
         """See `Fitter`: mean absolute errors (m) over windows that lie in reserved blocks."""
-        which = self.balance.reserved[self.windows.block]
+        which = self.windows.block == GROUPS
         motion, noise = [p.x for p in self.balance.paths()], self.balance.noise.rms
         data = replicate(after, self.balance.data, motion, noise, seed)
 

@@ -26,19 +26,21 @@ COARSE = 3.0
 """Length of integration steps, in those of a simulation: windows are short, and run thousands of times."""
 MOST_WINDOWS = 96
 """Of longer recordings, windows are taken evenly spread."""
+GROUPS = 8
+"""Groups of windows that are left out in turn."""
 LEAST_ROWS = 8
 """Rows of a window, at the least."""
 
 
 @dataclass(frozen=True)
 class Windows:
-    """Where a stage is let go in each segment of a force balance, for how many rows; the windows' blocks."""
+    """Where a stage is let go in each segment of a force balance, for how many rows; which are reserved."""
 
     balance: ForceBalance
     starts: Sequence[np.ndarray]
     rows: int
-    block: np.ndarray
-    """(W,), of all windows, in the order of the segments."""
+    reserved: np.ndarray
+    """(W,) bool: those in reserved blocks of the balance, in the order of the segments."""
 
     @classmethod
     def of(cls, balance: ForceBalance) -> Windows:
@@ -50,14 +52,32 @@ class Windows:
         for s in data.segments:
             kept = balance.whitening.rows(s)
             count = s.time[kept].size
-            first = np.arange(kept.start, min(kept.stop, s.time.size - rows), max(1, rows // 2))
+            first = np.arange(kept.start, min(kept.stop, s.time.size - rows), rows)
             number = [np.clip((k - kept.start) // kept.step, 0, count - 1) for k in (first, first + rows - 1)]
             own, end = (balance.block[before + n] for n in number)
             starts.append(first[own == end])
             blocks.append(own[own == end])
             before += count
         thin = max(1, -(-sum(s.size for s in starts) // MOST_WINDOWS))
-        return cls(balance, [s[::thin] for s in starts], rows, np.concatenate([b[::thin] for b in blocks]))
+        reserved = balance.reserved[np.concatenate([b[::thin] for b in blocks])]
+        return cls(balance, [s[::thin] for s in starts], rows, reserved)
+
+    @property
+    def order(self) -> np.ndarray:
+        """Windows (W,) group by group: those used in turn, so that each group has a bit of every motion."""
+        return np.argsort(self._group, kind="stable")
+
+    @property
+    def block(self) -> np.ndarray:
+        """Return the group of each window in that order, (W,); the last is that of the reserved."""
+        return np.sort(self._group)
+
+    @property
+    def _group(self) -> np.ndarray:
+        used = ~self.reserved
+        group = np.full(used.size, GROUPS)
+        group[used] = np.arange(np.count_nonzero(used)) % GROUPS
+        return group
 
     @property
     def seconds(self) -> float:
@@ -66,7 +86,7 @@ class Windows:
 
     def on(self, balance: ForceBalance) -> Windows:
         """Return the same windows of other data of equal length."""
-        return Windows(balance, self.starts, self.rows, self.block)
+        return Windows(balance, self.starts, self.rows, self.reserved)
 
     def off(self, stage: Stage) -> Floats:
         """Return how far the simulated position is off, m, (W, rows); what is not finite is far.
@@ -91,7 +111,7 @@ class Windows:
         if sensors:
             left = float(np.sum(np.concatenate(followed) ** 2))
             off *= np.sqrt(max(float(np.sum(self.moved() ** 2)) / max(left, 1e-300), 1.0))
-        return np.asarray(np.clip(off, -far, far))
+        return np.asarray(np.clip(off, -far, far)[self.order])
 
     def moved(self) -> Floats:
         """Return how far the recorded position is from where each window begins, m, (W, rows)."""
@@ -99,4 +119,4 @@ class Windows:
         for segment, starts in zip(self.balance.data.segments, self.starts, strict=True):
             rows = segment.position[starts[:, None] + np.arange(self.rows)]
             found.append(rows - rows[:, :1])
-        return np.concatenate(found)
+        return np.asarray(np.concatenate(found)[self.order])
