@@ -1,4 +1,4 @@
-"""Recordings that others made, diagnosed by the second method: Silverbox, Bouc-Wen, EMPS.
+"""Recordings that others made, diagnosed: Silverbox, Bouc-Wen, EMPS.
 
     python tools/bench_benchmarks.py DATA --json benchmarks.json
 
@@ -20,8 +20,8 @@ import click
 import numpy as np
 from figures_table import Figure, show
 
+from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.result import Diagnosis
-from rtcomp.diagnosis.second.pipeline import diagnose
 from rtcomp.kernels import Floats
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.simulate import Simulator
@@ -202,7 +202,7 @@ def main(data: Path | None, budget: float, path: Path | None) -> None:
             continue
         figures += run(data / "real" / name, budget)
     if figures:
-        show("Recordings that others made, second method", figures, path)
+        show("Recordings that others made", figures, path)
 
 
 if __name__ == "__main__":

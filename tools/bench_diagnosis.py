@@ -25,7 +25,7 @@ import numpy as np
 from figures_table import Figure, show
 from on_terminal import Shown, on_terminal
 
-from rtcomp.diagnosis.diagnose import diagnose
+from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.result import Diagnosis
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped

@@ -4,7 +4,7 @@
 
 DATA holds `real/servo-pendulum`; without it all is skipped. The error is the mean absolute one of position:
 of a simulation with the servo's own controller on the recorded reference (as its authors judge, arXiv
-2410.08650), and of simulations over half a second from points of the recording, driven by the recorded duty.
+2410.08650), and of short simulations from points of the recording, driven by the recorded duty.
 """
 
 from __future__ import annotations
@@ -16,10 +16,12 @@ import click
 import numpy as np
 from figures_table import Figure, show
 
-from rtcomp.diagnosis.by_position.windows import Windows, windows_of
-from rtcomp.diagnosis.diagnose import diagnose
-from rtcomp.diagnosis.motion import prepare
+from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.baseline import baseline
+from rtcomp.diagnosis.data import load_data
+from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.result import Diagnosis
+from rtcomp.diagnosis.windows import Windows
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
 from rtcomp.jobs.simulate import on_reference
@@ -80,7 +82,9 @@ def held_out(folder: Path, believed: Stage, learn: tuple[int, ...], judge: int) 
     done = diagnose(believed, [part for gain in learn for part in recordings(folder, gain)])
     taken = time.perf_counter() - began
     data = recordings(folder, judge)
-    windows = windows_of(data, prepare(believed, data).cut)
+    balance = ForceBalance(believed, load_data(data))
+    baseline(balance)
+    windows = Windows.of(balance)
     named = " and ".join(" or ".join(e.names) for e in done.effects)
     retuned = done.retuned_stage or believed
     gains = "+".join(map(str, learn))

@@ -4,7 +4,7 @@ Draws a sealed trial, diagnoses it in both ways, and pairs the answers case by c
 family and strength how many both, only the old, only the new and neither got right, with the exact test on
 those where they differ (McNemar 1947: a binomial test with 1/2). Prints a table; ``--json FILE`` writes it.
 
-    python tools/compare_diagnosis.py --cases 80 --seed 7 --out out/compare --json compare.json
+    python tools/compare_diagnosis.py --cases 80 --seed 7 --old "old/bin/rtcomp diagnose"
     python tools/compare_diagnosis.py --trials out/compare/old out/compare/new
 """
 
@@ -134,10 +134,8 @@ def median_seconds(rows: Sequence[Row]) -> float:
 @click.option("--only", type=click.Choice(list(SHARES)), help="Cases of this kind and no others.")
 @click.option("--family", "families", metavar="NAME", multiple=True, help="Default all.")
 @click.option("--forms", type=click.FloatRange(0.0, 1.0), help="Share of effects in another form.")
-@click.option("--old", default="first", show_default=True, metavar="METHOD")
-@click.option("--new", default="second", show_default=True, metavar="METHOD")
-@click.option("--old-command", metavar="COMMAND", help="Instead of `rtcomp diagnose`, for the old way.")
-@click.option("--new-command", metavar="COMMAND", help="Instead of `rtcomp diagnose`, for the new way.")
+@click.option("--old", metavar="COMMAND", help="Instead of `rtcomp diagnose`, for the old way.")
+@click.option("--new", metavar="COMMAND", help="Instead of `rtcomp diagnose`, for the new way.")
 @click.option("--jobs", type=click.IntRange(1, 1024), help="Processes at a time; default one a core.")
 @click.option("--timeout", type=click.FloatRange(1.0, 1e5), default=900.0, show_default=True, help="s.")
 @click.option("--keep", is_flag=True, help="Keep recordings and diagnoses.")
@@ -146,24 +144,20 @@ def median_seconds(rows: Sequence[Row]) -> float:
 @click.option("--json", "target", type=click.Path(path_type=Path))
 @output_options("out/compare")
 def main(
-    cases: int, seed: int, only: str | None, families: tuple[str, ...], forms: float | None, old: str,
-    new: str, old_command: str | None, new_command: str | None, jobs: int | None, timeout: float, keep: bool,
+    cases: int, seed: int, only: str | None, families: tuple[str, ...], forms: float | None,
+    old: str | None, new: str | None, jobs: int | None, timeout: float, keep: bool,
     trials: tuple[Path, Path] | None, target: Path | None, out: Path, force: bool,
 ) -> None:  # fmt: skip
     if trials is None:
         chosen = known_families(families)
         replay = (sys.executable, "-m", "rtcomp.cli.main", "replay")
-        # Both are asked for before the first is run: the second may not exist.
-        ways = {
-            "old": (old, diagnosis_command(old, old_command)),
-            "new": (new, diagnosis_command(new, new_command)),
-        }
+        ways = {"old": diagnosis_command(old), "new": diagnosis_command(new)}
         with prepare_output(out, force) as work:
-            for name, (method, command) in ways.items():
+            for name, command in ways.items():
                 (work / name).mkdir(parents=True)
                 settings = Settings(
                     cases, seed, jobs or os.cpu_count() or 1, command, replay, timeout, (), only, chosen,
-                    forms, method,
+                    forms,
                 )  # fmt: skip
                 with Progress(name) as bar:
                     trial(settings, work / name, shown(bar), keep)

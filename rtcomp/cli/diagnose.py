@@ -35,16 +35,12 @@ COLUMNS = ("time", "position", "voltage", "reference", "enabled", "status", "ove
 @rate_option
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the random draws.")
 @click.option(
-    "--method", type=click.Choice(["first", "second"]), default="first", show_default=True,
-    help="Which diagnosis decides: the first, or the one that is to replace it (docs/how-it-works).",
-)  # fmt: skip
-@click.option(
     "--input", "between", type=click.Choice(["held", "band-limited"]),
-    help="What the command does between rows; both are tried where it is not said (second method).",
+    help="What the command does between rows; both are tried where it is not said.",
 )  # fmt: skip
 @click.option(
     "--budget", type=click.FloatRange(0.0, min_open=True), default=60.0, show_default=True, metavar="SECONDS",
-    help="Ends the search with the best answer so far (second method).",
+    help="Ends the search with the best answer so far.",
 )  # fmt: skip
 @click.option(
     "--assume-units", is_flag=True,
@@ -59,7 +55,6 @@ def diagnose(
     mapping: dict[str, str],
     rate: float | None,
     seed: int,
-    method: str,
     between: str | None,
     budget: float,
     assume_units: bool,
@@ -77,7 +72,6 @@ def diagnose(
       rtcomp diagnose a.csv b.csv --stage stage.yaml --map position=qm --map voltage=vir
     """
     from dataclasses import replace
-    from functools import partial
 
     from rtcomp.diagnosis.admit import admit
     from rtcomp.diagnosis.readings import in_si_units
@@ -94,21 +88,16 @@ def diagnose(
     notes = [f"in {r.path.name}: {note}" if several else note for r in data for note in r.notes]
     notes += [*assumed, *admit(stage, data)]
 
-    from rtcomp.diagnosis.diagnose import diagnose as first
-    from rtcomp.diagnosis.second.pipeline import diagnose as second
+    from rtcomp.diagnosis.pipeline import diagnose as diagnosed
     from rtcomp.report.diagnosis_page import diagnosed_page
     from rtcomp.report.page import write_page
     from rtcomp.yamlfile import dump_yaml, write_text
 
     with prepare_output(out, force) as work:
         with Steps(quiet=as_json) as steps:
-            if method == "second":
-                held = None if between is None else between == "held"
-                run = partial(second, held=held, budget=budget)
-            else:
-                run = partial(first)
-            found = run(
-                stage, data, seed=seed, located=steps.located,
+            held = None if between is None else between == "held"
+            found = diagnosed(
+                stage, data, held=held, budget=budget, seed=seed, located=steps.located,
                 progress=lambda done, name: steps.update(name, done),
             )  # fmt: skip
         found = replace(found, notes=list(dict.fromkeys([*notes, *found.notes])))

@@ -45,13 +45,6 @@ if TYPE_CHECKING:
     help="Share of effects hidden in another form, of those that have one; by default that of the family.",
 )
 @click.option(
-    "--method",
-    type=click.Choice(["first", "second"]),
-    default="first",
-    show_default=True,
-    help="Of diagnosis, as `rtcomp diagnose` has it.",
-)
-@click.option(
     "--resume", metavar="DIR", type=click.Path(path_type=Path),
     help="Go on with a trial that was stopped: where it was kept. Its cases, seed and kind count.",
 )  # fmt: skip
@@ -73,7 +66,6 @@ def trial(
     only: str | None,
     families: tuple[str, ...],
     forms: float | None,
-    method: str,
     resume: Path | None,
     out: Path,
     force: bool,
@@ -107,10 +99,10 @@ def trial(
     if resume is not None:
         so_far = Stopped.read(resume)
         cases, seed, only = so_far.cases, so_far.seed, so_far.only
-        families, forms, method = tuple(so_far.families), so_far.forms, so_far.method
+        families, forms = tuple(so_far.families), so_far.forms
     settings = Settings(
-        cases, seed, jobs or os.cpu_count() or 1, diagnosis_command(method, command), (*here, "replay"),
-        timeout, chosen, only, families, forms, method,
+        cases, seed, jobs or os.cpu_count() or 1, diagnosis_command(command), (*here, "replay"),
+        timeout, chosen, only, families, forms,
     )  # fmt: skip
     with prepare_output(out, force) as work, Progress("trial", quiet=as_json) as bar:
         done = run(
@@ -134,28 +126,11 @@ def known_families(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(names) or tuple(FAMILIES)
 
 
-def diagnosis_command(method: str, command: str | None = None) -> tuple[str, ...]:
-    """Return the command that diagnoses by `method`, recording, stage and output still to be added.
-
-    Where `rtcomp diagnose` has no such method, raise RtcompError. A `command` of one's own is told of any
-    method but the first.
-    """
-    from rtcomp.cli.diagnose import diagnose
-    from rtcomp.errors import RtcompError
-
+def diagnosis_command(command: str | None = None) -> tuple[str, ...]:
+    """Return the command that diagnoses, or `command`; recording, stage and output are still to be added."""
     if command:
-        return (*shlex.split(command), *(("--method", method) if method != "first" else ()))
-    own = (sys.executable, "-m", "rtcomp.cli.main", "diagnose")
-    option = next((p for p in diagnose.params if p.name == "method"), None)
-    if option is None:
-        if method != "first":
-            raise RtcompError(f"rtcomp diagnose has no method {method!r} yet; there is only the first")
-        return own
-    if isinstance(option.type, click.Choice) and method not in option.type.choices:
-        raise RtcompError(
-            f"rtcomp diagnose has no method {method!r}; there is {', '.join(option.type.choices)}"
-        )
-    return (*own, "--method", method)
+        return tuple(shlex.split(command))
+    return (sys.executable, "-m", "rtcomp.cli.main", "diagnose")
 
 
 def _show(done: Trial, out: Path) -> None:

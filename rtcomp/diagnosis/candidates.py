@@ -1,36 +1,240 @@
-"""Where to look for each entry of the catalogue: the points of its parameters from which a search starts.
+"""Candidates: every effect of the catalogue, at starting values that the units of its parameters give.
 
-An entry that acts as a force of free size is tried as a column of the ledger (`Column`); one that changes
-friction, drive, sensor or motion is tried at work, at a few sizes (`Point`). All sizes come from the
-recording at hand: its stroke, speeds, commands, times, and the friction already found.
+A parameter's unit gives its scale on this recording (`scales`). An effect needs to say nothing more; where a
+parameter has no unit, it states start values.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
-from rtcomp.diagnosis.scene import Column, Entry, Point, Scene
-from rtcomp.diagnosis.search_at_work import at_work
-from rtcomp.diagnosis.search_forces import forces
-from rtcomp.physics import Effect, build, catalogue
+import numpy as np
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.balance import BASE, ForceBalance
+from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.fitted import Fitted
+from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.scales import Scales
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats
+from rtcomp.physics import Effect, Parameter, catalogue
+
+SMALL = 0.05
+"""Size of a dimensionless parameter at which its first-order effect is looked at."""
+NOT_IN_PROPORTION = ("s", "V")
+"""Units of what shifts or cuts a signal: far from neutral it does not act in proportion; tried there too."""
+POINT = 1e-2
+"""Relative size of a step that is taken to be first order."""
 
 
-def searches(scene: Scene) -> Iterator[Column | Point]:
-    """Go through everything worth trying on this recording, entry by entry."""
-    yield from forces(scene)
-    for point in at_work(scene):
-        if _known(point.entry):
-            yield point
+@dataclass(frozen=True)
+class Candidate:
+    """An entry at a point of its parameters, and what the model changes by with its sizes, (q, n)."""
+
+    term: Term
+    parts: tuple[Entry, ...]
+    """Entries whose changes are the columns: unit sizes, quarter periods, or the entry itself."""
+    columns: Floats
+    low: Floats
+    high: Floats
+    """Bounds of the sizes, (q,) each."""
+    solved: bool = False
+    """Whether a fit solves for its sizes, wherever they begin."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return str(self.term.entry["name"])
+
+    @property
+    def family(self) -> str:
+        """Its name and form."""
+        return f"{self.name} {self.term.entry.get('form', '')}"
 
 
-def _known(entry: Entry) -> bool:
+def searchable(balance: ForceBalance) -> Iterator[type[Effect]]:
+    """Go through what may be missing; not what stands for a number of the belief, which is refitted."""
+    for kind in catalogue.entries():
+        if kind.searchable and (not kind.stands_for or _denied(balance, kind.stands_for)):
+            yield kind
+
+
+def _only_bias(kind: type[Effect], balance: ForceBalance) -> bool:
+    """Tell whether a constant force is all that an effect can be on this axis."""
+    return kind.bias and (balance.stage.axis != "rotary" or len(kind.linear) < 2)
+
+
+def _denied(balance: ForceBalance, number: str) -> bool:
+    return number in BASE and balance.without(number)
+
+
+def candidates(
+    fitter: Fitter, fitted: Fitted, taken: Sequence[str] = (), *, events: bool = False
+) -> list[Candidate]:
+    """Return every candidate beside a fitted model, with the columns it would add to it.
+
+    With `events`, those only that happen once, at a moment that the residual shows.
+    """
+    balance = fitter.balance
+    scales = Scales.of(fitter, fitted)
+    offset = fitter.has_offset(fitted) or any(ent.kind_of(e).bias for e in fitted.entries)
+    kinds = [
+        k
+        for k in searchable(balance)
+        if k.name not in taken
+        and fitter.judges(k)
+        and not (offset and _only_bias(k, balance))
+        and ent.happens_once(k) >= events
+    ]
+    points = {k: list(_points(k, scales, fitter)) for k in kinds}
+
+    def make(item: tuple[type[Effect], tuple[Entry, str]]) -> Candidate | None:
+        return _candidate(fitter, fitted, *item)
+
+    # What changes nothing at its first point (friction, where there is none) is not tried at the others.
+    first = shared(make, [(kind, found[0]) for kind, found in points.items() if found])
+    shown = [c for c in first if c is not None]
+    names = {c.name for c in shown}
+    rest = [(kind, point) for kind, found in points.items() for point in found[1:] if kind.name in names]
+    return [*shown, *(c for c in shared(make, rest) if c is not None)]
+
+
+def _points(kind: type[Effect], scales: Scales, fitter: Fitter) -> Iterator[tuple[Entry, str]]:
+    """Go through entries at start values, and the linear parameter looked at ("" for the entry as is)."""
+    rotary = fitter.balance.stage.axis == "rotary"
+    own = [p for p in kind.parameters if rotary or p.unit != "N m"]
+    for form in list(kind.forms) or [""]:
+        base: Entry = {"name": kind.name, **({"form": form} if form else {})}
+        base.update({p.name: ent.neutral(kind, p.name) for p in own if p.name in kind.linear})
+        nonlinear = [p for p in own if p.name not in kind.linear and _searched(kind, p)]
+        looked = [""] if fitter.linear(kind) else [n for n in kind.linear if n in base] or [""]
+        for linear in looked:
+            # What only a wave has stays out of a slope.
+            moved = [p for p in nonlinear if _of_linear(kind, p, linear)]
+            still = {p.name: (scales.of_parameter(p, kind) or [0.0])[0] for p in nonlinear if p not in moved}
+            ranges = [
+                _phases(kind, base, fitter) if p.unit == ent.PHASE else scales.of_parameter(p, kind)
+                for p in moved
+            ]
+            for values in itertools.product(*ranges):
+                yield {**base, **still, **dict(zip([p.name for p in moved], values, strict=True))}, linear
+        for name in [] if fitter.linear(kind) else kind.linear:
+            p = ent.parameter(kind, name)
+            if name in base and p.unit in NOT_IN_PROPORTION:
+                still = {q.name: (scales.of_parameter(q, kind) or [0.0])[0] for q in nonlinear}
+                yield from (({**base, **still, name: value}, "") for value in scales.of_parameter(p, kind))
+
+
+def _searched(kind: type[Effect], p: Parameter) -> bool:
+    return p.default is None or p.unit == ent.PHASE or p.name in kind.search_grid
+
+
+def _of_linear(kind: type[Effect], p: Parameter, linear: str) -> bool:
+    """Tell whether a nonlinear parameter matters to the force of a linear one."""
+    waves = any(q.unit == ent.PHASE for q in kind.parameters)
+    only = p.unit == ent.PHASE or p.name == ent.PERIOD
+    return not (waves and only) or not linear or _waves_of(kind, linear)
+
+
+def _phases(kind: type[Effect], entry: Entry, fitter: Fitter) -> list[float]:
+    """Return the phases to start from: one where quarter periods do for the rest."""
+    if not fitter.linear(kind) or ent.waves(kind, {**entry, **{p.name: 0.0 for p in kind.parameters}}):
+        return [0.0]
+    return [float(a) for a in np.linspace(0.0, np.pi, 4, endpoint=False)]
+
+
+def _waves_of(kind: type[Effect], linear: str) -> bool:
+    return linear == "amplitude" and any(p.unit == ent.PHASE for p in kind.parameters)
+
+
+def _candidate(
+    fitter: Fitter, fitted: Fitted, kind: type[Effect], point: tuple[Entry, str]
+) -> Candidate | None:
+    """Make a candidate: columns of free size, or what the model changes by with the entry at work."""
+    entry, linear = point
     try:
-        catalogue.entry(str(entry["name"]))
-    except ValueError:
-        return False
-    return True
+        if fitter.linear(kind):
+            parts = ent.basis(entry)
+            columns = fitter.units([*fitted.entries, entry])
+            return _finite(Candidate(Term.of(entry), tuple(parts), columns, *ent.bounds_of(entry), True))
+        if not linear:
+            change = fitter.change(fitted, entry)[None, :]
+            return _finite(Candidate(Term.of(entry), (entry,), change, np.zeros(1), np.full(1, np.inf)))
+        p = ent.parameter(kind, linear)
+        step = _step(p, fitter.balance)
+        phases = [p.name for p in kind.parameters if p.unit == ent.PHASE]
+        if _waves_of(kind, linear):
+            parts = [{**entry, linear: step, phases[0]: angle} for angle in (0.0, 0.5 * np.pi)]
+            free = frozenset(q.name for q in kind.parameters if q.name in entry and q.name not in kind.linear)
+            term = Term(entry, free | {linear})
+            low, high = np.full(2, -p.high / step), np.full(2, p.high / step)
+        else:
+            parts = [{**entry, linear: step}]
+            dead = {p.name for p in kind.parameters if p.unit == ent.PHASE or p.name == ent.PERIOD}
+            own = {p.name for p in kind.parameters if p.name in entry}
+            term = Term(entry, frozenset(own - set(kind.linear) - (dead if phases else set())) | {linear})
+            low, high = (
+                np.array([(p.lowest - entry[linear]) / step]),
+                np.array([(p.high - entry[linear]) / step]),
+            )
+        columns = np.array([fitter.change(fitted, part) for part in parts])
+        return _finite(Candidate(term, tuple(parts), columns, low, high))
+    except ConfigError:
+        return None
 
 
-def effect_of(entry: Entry) -> Effect:
-    """Build the effect of an entry."""
-    return build(entry)
+def _finite(candidate: Candidate) -> Candidate | None:
+    """Return the candidate where its columns are finite and not all nothing."""
+    power = float(np.sum(candidate.columns**2))
+    return candidate if np.isfinite(power) and power > 0.0 else None
+
+
+def started(candidate: Candidate, sizes: Floats) -> Term:
+    """Return the term to fit from: the candidate with the sizes that the screening found."""
+    entry = candidate.term.entry
+    kind = ent.kind_of(entry)
+    if candidate.solved:
+        return candidate.term
+    moved = {n for part in candidate.parts for n in part if part[n] != entry[n]}
+    if not moved:
+        return candidate.term
+    out = dict(entry)
+    phases = [p.name for p in kind.parameters if p.unit == ent.PHASE]
+    if len(candidate.parts) == 2:
+        name = next(n for n in moved if n not in phases)
+        step = float(candidate.parts[0][name])
+        most = 0.9 * ent.parameter(kind, name).high
+        out[name] = min(float(np.hypot(*sizes)) * step, most)
+        out[phases[0]] = float(np.arctan2(sizes[1], sizes[0]))
+    else:
+        name = next(iter(moved))
+        p = ent.parameter(kind, name)
+        neutral = float(entry[name])
+        value = neutral + float(sizes[0]) * (float(candidate.parts[0][name]) - neutral)
+        out[name] = min(max(value, 0.9 * p.lowest), 0.9 * p.high)
+    return candidate.term.with_entry(out)
+
+
+def _step(p: Parameter, balance: ForceBalance) -> float:
+    """Return a size of a linear parameter that is first order and above rounding."""
+    data = balance.data
+    volts = float(np.sqrt(np.mean(np.concatenate([s.voltage for s in data.segments]) ** 2)))
+    low, high = data.stroke
+    scale = {
+        "m": POINT * (high - low),
+        "s": data.period,
+        "V": SMALL * volts,
+        "1": SMALL,
+        "1/m": SMALL / (high - low),
+    }
+    force = balance.stage.force_constant * volts
+    forces = {"N": force, "N s/m": force / max(high - low, 1e-12)}
+    size = scale.get(p.unit, SMALL * forces.get(p.unit, 1.0))
+    if p.unit == "m":
+        size = max(3.0 * balance.noise.rms, 1e-4 * (high - low))
+    return min(size, 0.5 * p.high)

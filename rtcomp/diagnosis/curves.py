@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from rtcomp.diagnosis.base import Fitted
-from rtcomp.diagnosis.candidates import effect_of
-from rtcomp.diagnosis.locate import Axis, axes_of
-from rtcomp.diagnosis.motion import Motion
+from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.locate import Axis
 from rtcomp.diagnosis.result import Place
-from rtcomp.diagnosis.scene import Entry
-from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
 BINS = 120
 """Points of a curve."""
-IN_TIME = {"friction-drift": True, "sensor-drift": False, "sensor-jump": False}
-"""Entries that are what they are by the time, whatever they go along with besides, and whether the force that
-drifts has the sign of the motion."""
 WAVES = 8
 """Periods of a wave that are drawn, of more in the stroke."""
 
@@ -38,46 +30,10 @@ class Curve(NamedTuple):
     """Whether both forces are given the sign of the motion, as friction has it."""
 
 
-def curves(motion: Motion, final: Fitted, entries: Sequence[Entry], axis: str) -> list[Curve | None]:
-    """Return the curve of each of `entries` beside the others of `final`; None where it has no force.
-
-    The force of an entry is what `final`, its numbers as they are, leaves without it and not with it. `axis`
-    is ``linear`` or ``rotary``.
-    """
-    looked = axes_of(motion, axis)
-    rest = final.residual
-    found: list[Curve | None] = []
-    for at, entry in enumerate(entries):
-        others = [effect_of(e) for i, e in enumerate(entries) if i != at]
-        try:
-            system = final.ledger.system(others)
-        except (ConfigError, np.linalg.LinAlgError):
-            found.append(None)
-            continue
-        without = system.y - system.columns @ final.coefficients[: system.columns.shape[1]]
-        force = without - rest
-        if not np.isfinite(force).all() or not np.any(force):
-            found.append(None)
-            continue
-        found.append(_along(_own(looked, entry), force, without, entry.get("period")))
-    return found
-
-
 def curve_of(looked: Sequence[Axis], entry: Entry, force: Floats, without: Floats) -> Curve:
     """Return the curve of an `entry`: its `force` and what is left `without` it (N, (n,)) on an axis."""
     waves = [a for a in looked if a.name == "position"] if "period" in entry else looked
     return _along(waves, force, without, entry.get("period"))
-
-
-def _own(looked: Sequence[Axis], entry: Entry) -> list[Axis]:
-    """Return the axes that an entry may be drawn along: those of its own, where it has such."""
-    if "period" in entry:
-        return [a for a in looked if a.name == "position"]
-    if entry["name"] not in IN_TIME:
-        return list(looked)
-    time = next(a for a in looked if a.name == "time")
-    directed = next(a for a in looked if a.name == "position" and a.odd is not None)
-    return [replace(time, odd=directed.odd) if IN_TIME[str(entry["name"])] else time]
 
 
 def left_over(places: Sequence[Place]) -> Curve | None:

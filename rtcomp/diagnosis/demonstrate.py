@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rtcomp.diagnosis.diagnose import diagnose
+from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.result import Diagnosis
 from rtcomp.errors import LimitError
 from rtcomp.hysteresis.model import HysteresisModel

@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rtcomp.diagnosis.bank import units_along
-from rtcomp.diagnosis.second.data import load_data
-from rtcomp.diagnosis.second.noise import Noise
-from rtcomp.diagnosis.second.spectrum import filtered
+from rtcomp.diagnosis.data import load_data
+from rtcomp.diagnosis.noise import Noise
+from rtcomp.diagnosis.spectrum import filtered
 from rtcomp.errors import RecordingError
 from rtcomp.kernels import Floats
 from rtcomp.recording.reader import Recording

@@ -29,7 +29,6 @@ class Stopped:
     """The kind that all cases are of; None for all kinds."""
     families: list[str] = field(default_factory=lambda: ["micrometre"])
     forms: float | None = None
-    method: str = "first"
     not_drawn: dict[str, str] = field(default_factory=dict)
     """Why cases could not be drawn, by case."""
     salts: dict[str, str] = field(default_factory=dict)

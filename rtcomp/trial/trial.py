@@ -55,8 +55,6 @@ class Settings:
     families: tuple[str, ...] = ("micrometre",)
     forms: float | None = None
     """Share of effects hidden in another form, of those that have one; None for that of each family."""
-    method: str = "first"
-    """Of diagnosis; `diagnose` holds what chooses it."""
 
 
 Progress = Callable[[str, int, int], None]
@@ -89,7 +87,6 @@ class Trial:
             "cases": settings.cases,
             "seed": settings.seed,
             "only": settings.only,
-            "method": settings.method,
             "forms": settings.forms,
             "seconds": self.seconds,
             "figures": [f.to_json() for f in self.figures],
@@ -150,7 +147,7 @@ def trial(
 def _nothing_yet(settings: Settings) -> Stopped:
     return Stopped(
         settings.cases, settings.seed, only=settings.only, families=list(settings.families),
-        forms=settings.forms, method=settings.method,
+        forms=settings.forms,
     )  # fmt: skip
 
 

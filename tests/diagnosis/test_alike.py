@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from recorded import run
 from recorded import stage as axis
-
 from rtcomp.diagnosis.alike import bounded, last, least_far, plainest, steadily_worse
 from rtcomp.diagnosis.base import fit_base
 from rtcomp.diagnosis.certain import birge, intervals, neighbours
 from rtcomp.diagnosis.departure import USUAL, departure, off
-from rtcomp.diagnosis.diagnose import diagnose
 from rtcomp.diagnosis.motion import prepare
 from rtcomp.diagnosis.refine import Refined, refine
 from rtcomp.diagnosis.scene import Entry
+
+from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.kernels import Floats
 
 

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from recorded import STAGE, run
+from rtcomp.diagnosis.believed_effects import Parted
+from rtcomp.diagnosis.motion import prepare
 from test_alike import reference
 
-from rtcomp.diagnosis.believed_effects import Parted
-from rtcomp.diagnosis.diagnose import diagnose
-from rtcomp.diagnosis.motion import prepare
+from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.result import Diagnosis
 from rtcomp.stage.stage import Stage
 

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from rtcomp.diagnosis.by_position.decide import Judge, Judged, Step, Verdicts, drop, worth_it
-from rtcomp.diagnosis.by_position.sticking import MUCH, hidden, mostly_hidden
 from rtcomp.diagnosis.by_position.told import holds, unsure
 from rtcomp.diagnosis.by_position.turning import Setting, fit
 from rtcomp.diagnosis.by_position.windows import windows_of
-from rtcomp.diagnosis.diagnose import diagnose
 from rtcomp.diagnosis.motion import BLOCKS
+
+from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.result import PositionFit
+from rtcomp.diagnosis.sticking import MUCH, hidden, mostly_hidden
 from rtcomp.jobs.demo import shipped
 from rtcomp.recording.driven import driven
 from rtcomp.recording.reader import Recording, read

@@ -9,7 +9,7 @@ import pytest
 from recorded import STAGE, cut, run, stage
 
 from rtcomp.control.references import Reference
-from rtcomp.diagnosis.diagnose import diagnose
+from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
 from rtcomp.jobs.simulate import closed_loop

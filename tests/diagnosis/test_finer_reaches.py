@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 from recorded import run, stage
+from rtcomp.diagnosis.base import SCALES, finer, fit_base
+from rtcomp.diagnosis.motion import prepare
 from test_alike import reference
 
-from rtcomp.diagnosis.base import SCALES, finer, fit_base
-from rtcomp.diagnosis.extend import level_and_reach
-from rtcomp.diagnosis.motion import prepare
+from rtcomp.diagnosis.retuned import level_and_reach
 
 ELEMENTS = [(2e5, 4e-6), (6e4, 1.2e-5)]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from recorded import STAGE, run, stage, there_and_back
 
-from rtcomp.diagnosis.diagnose import diagnose
+from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.stage.stage import Stage
 
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import pytest
 from recorded import run, stage, there_and_back
-
 from rtcomp.diagnosis.addition import _agrees, _below_a_count, best_addition
 from rtcomp.diagnosis.base import fit_base
 from rtcomp.diagnosis.certain import intervals
-from rtcomp.diagnosis.diagnose import diagnose
 from rtcomp.diagnosis.motion import prepare
 from rtcomp.diagnosis.refine import Refined, refine
 from rtcomp.diagnosis.scene import Scene
 from rtcomp.diagnosis.screen import BENT, screen
 from rtcomp.diagnosis.search_at_work import _cyclic_periods, _ringing
+
+from rtcomp.diagnosis.pipeline import diagnose
 
 
 def scene(*effects: dict[str, object]) -> Scene:

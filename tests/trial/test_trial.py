@@ -101,23 +101,6 @@ def test_a_family_that_there_is_not_is_refused(tmp_path: Path) -> None:
     assert len(run.stderr.splitlines()) == 1 and not (tmp_path / "trial").exists()
 
 
-def test_a_method_is_passed_on_or_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from rtcomp.cli import diagnose as module
-    from rtcomp.cli.trial import diagnosis_command
-    from rtcomp.errors import RtcompError
-
-    assert diagnosis_command("second", "mine --fast") == ("mine", "--fast", "--method", "second")
-    assert diagnosis_command("first", "mine") == ("mine",)
-    assert diagnosis_command("second")[-3:] == ("diagnose", "--method", "second")
-    with pytest.raises(RtcompError, match="no method 'third'"):
-        diagnosis_command("third")
-    without = [p for p in module.diagnose.params if p.name != "method"]
-    monkeypatch.setattr(module.diagnose, "params", without)
-    assert diagnosis_command("first")[-1] == "diagnose"
-    with pytest.raises(RtcompError, match="there is only the first"):
-        diagnosis_command("second")
-
-
 @pytest.mark.slow
 def test_one_case_of_each_family_is_drawn_scored_and_shown(tmp_path: Path) -> None:
     out = tmp_path / "trial"
@@ -288,8 +271,8 @@ def test_prove(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     The budget is one that a busy machine does not use up: the answers do not depend on its load.
     """
     out = tmp_path / "trial"
-    patient = f"{sys.executable} -m rtcomp diagnose --method second --budget 200"
-    more = ("--cases", 8, "--seed", 11, "--method", "first", "--diagnose", patient)
+    patient = f"{sys.executable} -m rtcomp diagnose --budget 200"
+    more = ("--cases", 8, "--seed", 11, "--diagnose", patient)
     run = trial(out, *more, timeout=3000.0)
     with capsys.disabled():
         print(f"\n{run.stdout}{run.stderr}")

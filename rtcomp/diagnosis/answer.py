@@ -1,0 +1,230 @@
+"""From the chosen model to the answer: verdict, names, numbers, stage, and what was left open."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.confidence import Alternatives
+from rtcomp.diagnosis.curves import left_over
+from rtcomp.diagnosis.detectability import sights
+from rtcomp.diagnosis.experiment import next_experiment
+from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.fitted import Fitted
+from rtcomp.diagnosis.intervals import Told, numbers, told
+from rtcomp.diagnosis.locate import locate
+from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
+from rtcomp.diagnosis.retuned import Numbers, all_by_one_factor, force_constant, retunings
+from rtcomp.diagnosis.selection import Search
+from rtcomp.diagnosis.settings import LEAST_GAIN, LEFT, LEVEL, TOLERANCE
+from rtcomp.diagnosis.stage_of import with_forces
+from rtcomp.diagnosis.validation import Reserved
+from rtcomp.diagnosis.where import Compared, curves
+from rtcomp.errors import ConfigError, RtcompError
+from rtcomp.stage.stage import Stage
+from rtcomp.units import for_axis, prefixed
+
+UNEXPLAINED = ("unexplained",)
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What the chosen model leaves beyond noise."""
+
+    significant: bool
+    """More than its replicates leave, above the noise more than models are off, and enough to be named."""
+    share: float
+    """Part of the baseline's error above the noise."""
+
+    @classmethod
+    def of(cls, fitter: Fitter, found: Search) -> Rest:
+        """Measure it against the replicates of the chosen model."""
+        error, first = float(found.chosen.errors.sum()), float(found.baseline.errors.sum())
+        relative = fitter.above_noise(found.chosen)
+        if found.null is None:
+            return cls(relative > TOLERANCE, 1.0 if not found.chosen.terms else error / first)
+        noise = float(np.median(found.null.errors))
+        share = max(error - noise, 0.0) / max(first - noise, 1e-300)
+        matters = relative > TOLERANCE and (not found.chosen.terms or math.sqrt(share) > LEAST_GAIN)
+        significant = matters and found.null.p_of_error(error) < LEVEL
+        return cls(significant, min(share, 1.0))
+
+
+def answer(
+    believed: Stage,
+    fitter: Fitter,
+    found: Search,
+    sets: Sequence[Alternatives],
+    reserved: Reserved,
+    seed: int,
+    *,
+    late: bool = False,
+) -> Diagnosis:
+    """Return the diagnosis that a search ends in; where it is `late`, without what takes long to tell."""
+    balance, base, chosen = fitter.balance, found.baseline, found.chosen
+    rest = Rest.of(fitter, found)
+    spans = told(fitter, chosen)
+    nearest = rest.significant and rest.share > LEFT
+    notes = _notes(balance, found, nearest)
+    shares = _shares(base, chosen, sets)
+    named = [] if nearest else _named(fitter, chosen, spans, sets, shares, rest)
+    final = chosen if named else base
+    view = Compared(balance)
+    before, after = fitter.force(base), fitter.force(final)
+    if rest.significant or (chosen.terms and not named):
+        left = locate(view, after, None, seed, believed.axis)
+        part = rest.share if named else 1.0
+        named.append(Named(UNEXPLAINED, 1.0, {}, part, curve=left_over(left)))
+    tuned = numbers(fitter, believed, final)
+    stages, moved = _stages(believed, fitter, base, final, tuned, bool(named))
+    verdict, matters = _verdict(named, fitter, believed, base, moved)
+    if not matters:
+        stages["after"] = stages["retuned"] = believed
+    errors = reserved.judge({"before": believed, **stages})
+    fit = Fit(errors["before"], errors["retuned"], errors["after"], errors["noise"])
+    where = (
+        [] if verdict == "consistent" else locate(view, before, after if named else None, seed, believed.axis)
+    )
+    beside = found.beside if final is found.chosen else None
+    seen = [] if late and beside is None else sights(fitter, final, found.null, beside)
+    names = {n for e in named for n in e.names}
+    return Diagnosis(
+        verdict,
+        where,
+        moved if matters else [],
+        named,
+        fit,
+        [s.name for s in seen if not s.seen and s.name not in names],
+        stages["after"],
+        _experiment(fitter, chosen, sets, named, view),
+        seen,
+        [Candidate(n, _part(g), _z(p), True) for n, g, p in found.screened],
+        notes,
+        view.plain([s.time for s in view.strips]),
+        before,
+        after,
+        balance.reserved[balance.block].astype(np.float64),
+        fitter.position(believed, stages["retuned"], stages["after"], seed),
+        stages["retuned"],
+    )
+
+
+def _part(gain: float) -> float:
+    return max(1.0 - math.exp(-gain), 0.0)
+
+
+def _z(p: float) -> float:
+    from scipy.stats import norm
+
+    return float(norm.isf(min(max(p, 1e-300), 1.0 - 1e-12))) if math.isfinite(p) else math.nan
+
+
+def _shares(base: Fitted, chosen: Fitted, sets: Sequence[Alternatives]) -> list[float]:
+    """Return the part of the mismatch that each effect explains: by what its absence would leave."""
+    lost = [float(chosen.errors.sum()) * (1.0 / max(1.0 - s.gain, 1e-12) - 1.0) for s in sets]
+    explained = 1.0 - float(chosen.errors.sum() / base.errors.sum())
+    total = sum(lost) or 1.0
+    return [explained * one / total for one in lost]
+
+
+def _named(
+    fitter: Fitter,
+    chosen: Fitted,
+    spans: Sequence[Told],
+    sets: Sequence[Alternatives],
+    shares: Sequence[float],
+    rest: Rest,
+) -> list[Named]:
+    without = [fitter.without(chosen, i) for i in range(len(chosen.terms))]
+    drawn = curves(fitter.balance, chosen.entries, fitter.force(chosen), without)
+    found = []
+    for one, span, share, curve in zip(sets, spans, shares, drawn, strict=True):
+        sure = one.probability * (1.0 - (rest.share if rest.significant else 0.0))
+        apart = ""
+        if len(one.names) > 1:
+            apart = "; ".join(f"{n}: {ent.kind_of({'name': n}).experiment}" for n in one.names)
+        found.append(Named(one.names, sure, span.values, float(np.clip(share, 0.0, 1.0)), apart, curve))
+    return sorted(found, key=lambda e: -e.share)
+
+
+def _stages(
+    believed: Stage, fitter: Fitter, base: Fitted, final: Fitted, tuned: Numbers, named: bool
+) -> tuple[dict[str, Stage], list[Retuned]]:
+    """Return the retuned and the extended stage, and the numbers of the belief that moved."""
+    stages = {"retuned": fitter.stage(base), "after": fitter.stage(final)}
+    moved = retunings(tuned, believed.axis)
+    # Forces whose size is no number of the model cannot have moved with the others.
+    fixed = any(
+        ent.adds_force(ent.kind_of(e)) and not ent.kind_of(e).linear for e in believed.mechanics.effects
+    )
+    factor = None if named or fixed else all_by_one_factor(numbers(fitter, believed, final, effects=True))
+    if factor is not None:
+        stages = {name: with_forces(stage, 1.0 / factor[0]) for name, stage in stages.items()}
+        moved = [force_constant(believed, *factor)]
+    return stages, moved + _found(fitter.balance, believed, tuned)
+
+
+def _found(balance: ForceBalance, believed: Stage, tuned: Numbers) -> list[Retuned]:
+    """Return the friction that a belief without any lacks, where there is any to speak of."""
+    drive = balance.drive_force()
+    level = float(tuned.values[3])
+    if believed.friction is not None or level < TOLERANCE * float(np.sqrt(np.mean(drive**2))):
+        return []
+    keys = (("viscous", "N s/m", 1), ("friction.level", "N", 3), ("friction.reach", "m", 4))
+    found = []
+    for key, unit, i in keys:
+        value, half = float(tuned.values[i]), float(tuned.half[i])
+        if tuned.before[i] == 0.0 and value > half:
+            told = Value(value, max(value - half, 0.0), value + half, for_axis(unit, believed.axis))
+            found.append(Retuned(key, 0.0, told))
+    return found
+
+
+def _verdict(
+    named: Sequence[Named], fitter: Fitter, believed: Stage, base: Fitted, moved: Sequence[Retuned]
+) -> tuple[Verdict, bool]:
+    """Return the verdict, and whether other numbers than the believed ones are given."""
+    if any(e.names != UNEXPLAINED for e in named):
+        return "missing-physics", True
+    relative = fitter.relative_of(believed)
+    better = fitter.relative(base) < (1.0 - LEAST_GAIN) * relative
+    matters = bool(moved) and better and relative > TOLERANCE
+    if named:
+        # Numbers bent to an unknown cause may do worse on other motion; friction where none was, not.
+        return "unexplained", matters and believed.friction is None
+    return ("retuned", True) if matters else ("consistent", False)
+
+
+def _notes(balance: ForceBalance, found: Search, nearest: bool) -> list[str]:
+    notes = [f"frequencies count by signal to noise, up to {balance.noise.bandwidth:.3g} Hz", *found.dropped]
+    names = ent.names(found.chosen.entries)
+    if nearest and names:
+        notes.append(f"nearest, but too much is left: {', '.join(names)}")
+    (low, high), unit = prefixed(for_axis("m", balance.stage.axis), *balance.data.stroke)
+    if names and not nearest:
+        notes.append(f"known from {low} to {high} {unit}, where this motion went, and not beyond")
+    return notes
+
+
+def _experiment(
+    fitter: Fitter,
+    chosen: Fitted,
+    sets: Sequence[Alternatives],
+    named: Sequence[Named],
+    view: Compared,
+) -> Experiment | None:
+    """Return the motion that tells apart what this one does not, None where there is nothing to."""
+    for one in sets:
+        if len(one.names) < 2 or not any(e.names == one.names for e in named):
+            continue
+        try:
+            stages = [fitter.stage(m) for m in one.models[:2]]
+            return next_experiment(stages[0], stages[1], (one.names[0], one.names[1]), view)
+        except (ConfigError, RtcompError):
+            return None
+    return None

@@ -1,0 +1,321 @@
+"""The force balance as a linear system: drive force on one side, what the motion needs on the other.
+
+    drive(t) = m a + c v + micro(t) + sum_i k_i z_i(t) + forces of entries        (equation error)
+
+z_i are unit stop elements on a grid of yield displacements, so that any virgin curve is within reach of the
+fit. Entries that add a force are columns of free size; those that change friction, drive, sensor or mass are
+at work while the other columns are made. Both sides go through the same filter, which weighs each frequency
+by how far the motion stands above the sensor's noise (`noise.Whitening`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.cache import Cache, Group
+from rtcomp.diagnosis.data import Data, Segment, reversals
+from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.noise import Noise, Whitening
+from rtcomp.diagnosis.reaches import MOST_OWN, joined
+from rtcomp.diagnosis.settings import BLOCK_REVERSALS, BLOCK_SECONDS, RESERVED_EVERY
+from rtcomp.diagnosis.signals import BASE, Signals, key_of
+from rtcomp.diagnosis.spectrum import filtered, spectrum
+from rtcomp.kernels import Floats
+from rtcomp.physics import Place
+from rtcomp.stage.balance import around_rows, forces, parts_of_drive
+from rtcomp.stage.stage import Stage
+
+FEWEST, MOST = 10, 25
+"""Blocks of a recording: at least, at most."""
+
+
+@dataclass(frozen=True)
+class System:
+    """``y = A c`` in whitened units: y (n,), columns (p, n); numbers of entries' columns by entry."""
+
+    y: Floats
+    columns: Floats
+    of_entry: tuple[slice, ...]
+
+
+class ForceBalance(Signals):
+    """The equation-error objective of one stage on one set of recordings."""
+
+    def __init__(self, stage: Stage, data: Data, noise: Noise | None = None) -> None:
+        super().__init__(stage, data, noise)
+        self._whitening: Whitening | None = None
+        self.blocks = 0
+        self.noise_power = 0.0
+        """N^2: mean square of what the sensor's noise makes of the residual below the motion's bandwidth."""
+        self.block: np.ndarray = np.zeros(0, dtype=np.int64)
+        self._reserved: np.ndarray = np.zeros(0, dtype=np.bool_)
+
+    def whiten(self, coefficients: Floats) -> None:
+        """Weigh frequencies by what the sensor's noise does to the residual of a fit (base columns)."""
+        random = np.random.default_rng(7)
+        shaken = []
+        for s in self.data.segments:
+            read = replace(s, position=s.position + self.noise.rms * random.standard_normal(s.position.size))
+            change = self._needed(s, coefficients) - self._needed(read, coefficients)
+            edge = min(50, change.size // 4)
+            shaken.append(change[edge:-edge])
+        self._whitening = Whitening.of(self.noise, self.data, shaken)
+        below = [filtered(s, self.data.rate, self.noise.wiener) for s in shaken]
+        self.noise_power = float(np.mean(np.concatenate(below) ** 2))
+        self._cache = Cache()
+        self._cut_blocks()
+
+    def put(self, reaches: Floats, step: float) -> None:
+        """Put the grid of yield displacements (m) to `reaches`, in steps of `step` (logarithm)."""
+        own = self.believed_reaches if self.believed_reaches.size <= MOST_OWN else np.zeros(0)
+        self.reaches = joined(own[own <= self.coarse[-1]], np.unique(reaches), step)
+        self.step = step
+        self._cache = Cache()
+
+    def on(self, data: Data) -> ForceBalance:
+        """Return the same objective, weights and grid on other data of equal length: a replicate."""
+        other = ForceBalance(self.stage, data, self.noise)
+        other.reaches, other.step, other.grain = self.reaches, self.step, self.grain
+        other._whitening, other.blocks, other.block = self._whitening, self.blocks, self.block
+        other._reserved = self._reserved
+        other.believed_speed = self.believed_speed
+        return other
+
+    @property
+    def power(self) -> float:
+        """Squared drive side of the blocks that are not reserved, as the belief has it."""
+        return self._power(self._plain_drive())
+
+    def _needed(self, segment: Segment, c: Floats) -> Floats:
+        """Return the force (N, (K,)) that a segment's motion needs, of coefficients `c` of the belief."""
+        path = self._path(segment, [], smooth=False)
+        units = self._units(self.stage, segment, path, [], [], None)
+        force = path.measured * c[0] + units @ np.concatenate([c[1 : len(BASE)], c[self.friction]])
+        made = [ent.build(one) for e in self.believed for one in ent.basis(e)]
+        for effect, size in zip(made, c[self.size :], strict=True):
+            force += size * self._force_of(effect, segment, path)
+        return np.asarray(force)
+
+    def _cut_blocks(self) -> None:
+        assert self._whitening is not None
+        kept = [s.time[self._whitening.rows(s)].size for s in self.data.segments]
+        turns = sum(reversals(s.position) for s in self.data.segments)
+        count = min(self.data.seconds / BLOCK_SECONDS, turns / BLOCK_REVERSALS if turns else np.inf)
+        self.blocks = int(np.clip(count, FEWEST, MOST))
+        self.block = np.arange(sum(kept)) * self.blocks // sum(kept)
+        time = self.plain([s.time for s in self.data.segments])
+        stepped = {int(self.block[np.argmin(np.abs(time - at))]) for at, _ in self.data.jumps}
+        self._reserved = reserved_blocks(self.blocks, stepped, self._furthest())
+
+    def _furthest(self) -> set[int]:
+        """Return the blocks in which command, position and speed are lowest and highest."""
+        signals = [
+            [s.voltage for s in self.data.segments],
+            [s.position for s in self.data.segments],
+            [p.v for p in self.paths()],
+        ]
+        rows = [at(self.plain(s)) for s in signals for at in (np.argmin, np.argmax)]
+        return {int(self.block[row]) for row in rows}
+
+    @property
+    def whitening(self) -> Whitening:
+        """The filter of both sides; raises RuntimeError before `whiten`."""
+        if self._whitening is None:
+            raise RuntimeError("whiten the balance first")
+        return self._whitening
+
+    @property
+    def reserved(self) -> np.ndarray:
+        """Blocks for the final judgement, (blocks,) bool: neither fitted nor selected on.
+
+        One of every few, judged within what was fitted: a block in which the reading steps is unlike all
+        others, and one that goes furthest shows what no other does.
+        """
+        return self._reserved
+
+    def system(self, entries: Sequence[Entry] = (), weights: Floats | None = None) -> System:
+        """Return the system with `entries`; `weights` (N/m) of the friction units where entries need them.
+
+        Raises ConfigError where a parameter is out of its bounds.
+        """
+        drive, base, added, by_load = self._groups(entries, weights)
+        y = self._whitened(drive)[0]
+        rows, spans = [self._whitened(g) for g in base], []
+        at = sum(r.shape[0] for r in rows)
+        for groups in added:
+            found = [self._whitened(g) for g in groups]
+            rows += found
+            spans.append(slice(at, at + len(found)))
+            at += len(found)
+        columns = np.concatenate(rows)
+        scale = self._scale(y, by_load)
+        return System(scale * y, scale * columns if scale != 1.0 else columns, tuple(spans))
+
+    def error(self, entries: Sequence[Entry], c: Floats, weights: Floats | None = None) -> Floats:
+        """Return ``y - A c`` (n,) of `system` for given coefficients, filtered as one signal: far cheaper."""
+        drive, base, added, by_load = self._groups(entries, weights)
+        y = self._whitened(drive)[0]
+        out = y.copy()
+        pending: list[Floats] | None = None
+        at = 0
+        for group in [*base, *(g for groups in added for g in groups)]:
+            kept = self._cache.get(group.key)
+            if kept is not None:
+                out -= c[at : at + kept[0].shape[0]] @ kept[0]
+                at += kept[0].shape[0]
+                continue
+            if group.times is not None:
+                sizes = c[at : at + group.width]
+                signals = group.times(sizes)
+            else:
+                made = group.make()
+                sizes = c[at : at + (1 if made[0].ndim == 1 else made[0].shape[1])]
+                signals = [m * sizes[0] if m.ndim == 1 else m @ sizes for m in made]
+            at += sizes.size
+            pending = signals if pending is None else [p + q for p, q in zip(pending, signals, strict=True)]
+        if pending is not None:
+            out -= self._filtered(pending)[0]
+        return np.asarray(self._scale(y, by_load) * out)
+
+    def forces_of(self, entries: Sequence[Entry]) -> Floats:
+        """Return the columns (p, n) of the last of `entries`, which adds a force; they are not kept."""
+        drive, _, added, by_load = self._groups(entries, None)
+        rows = np.concatenate([self._filtered(g.make()) for g in added[-1]])
+        return np.asarray(self._scale(self._whitened(drive)[0], by_load) * rows)
+
+    def _scale(self, y: Floats, by_load: Group | None) -> float:
+        """Return what makes up for a residual that depends less on the command than that of the belief.
+
+        The density of a command is that of its residual times their derivative: a model whose drive side is
+        smaller, or whose friction takes up whatever the drive gives (`by_load`), has explained nothing by it.
+        """
+        told = y if by_load is None else y - self._whitened(by_load)[0]
+        plain = self._plain_drive()
+        if told is plain or self._whitening is None:
+            return 1.0
+        return float(np.sqrt(max(self._swing(plain) / max(self._swing(told), 1e-300), 1.0)))
+
+    def _groups(
+        self, entries: Sequence[Entry], weights: Floats | None
+    ) -> tuple[Group, list[Group], list[list[Group]], Group | None]:
+        """Return the drive side, the columns of base and of each entry, the friction that loads make."""
+        everything = [*self.believed, *entries]
+        adding = [ent.adds_force(ent.kind_of(e)) for e in everything]
+        work = [*self._fixed, *(ent.build(e) for e, adds in zip(everything, adding, strict=True) if not adds)]
+        drive = [e for e in work if e.place is Place.DRIVE]
+        sensors = [e for e in work if e.place is Place.SENSOR]
+        modifiers = [e for e in work if e.place is Place.FRICTION]
+        modifiers += [companion for e in modifiers for companion in e.companions()]
+        bodies = [e for e in work if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
+        forces_added = [ent.build(e) for e, adds in zip(everything, adding, strict=True) if adds]
+        side = Group(("y", key_of(drive), key_of(sensors)), lambda: self._drive_side(drive, sensors))
+        base, by_load = self._base(drive, sensors, modifiers, bodies, forces_added, weights)
+        added = [
+            [self._added(made, sensors) for made in ent.basis(e)] if adds else []
+            for e, adds in zip(everything, adding, strict=True)
+        ]
+        return side, base, added, by_load
+
+    def _plain_drive(self) -> Floats:
+        fixed = [e for e in self._fixed if e.place is Place.DRIVE]
+        sensors = [e for e in self._fixed if e.place is Place.SENSOR]
+        key = ("y", key_of(fixed), key_of(sensors))
+        found: Floats = self._whitened(Group(key, lambda: self._drive_side(fixed, sensors)))[0]
+        return found
+
+    def _power(self, y: Floats) -> float:
+        return float(np.sum(y[~self.reserved[self.block]] ** 2))
+
+    def _swing(self, y: Floats) -> float:
+        """Return the power of what a constant does not change."""
+        return float(np.var(y[~self.reserved[self.block]]))
+
+    # -- rows, whitened and joined over the segments ------------------------------------------------------
+
+    def _whitened(self, group: Group) -> Floats:
+        """Return a group's columns (p, n), filtered, thinned and joined."""
+        found: Floats = self._cache.of(group.key, lambda: [self._filtered(group.make())])[0]
+        return found
+
+    def _filtered(self, made: list[Floats]) -> Floats:
+        """Return signals (K, p) or (K,), one array a segment, filtered, thinned and joined: (p, n)."""
+        parts = []
+        for segment, signals in zip(self.data.segments, made, strict=True):
+            table = np.ascontiguousarray(np.atleast_2d(signals.T))
+            if self._whitening is None:
+                parts.append(table[:, 3:-3])
+                continue
+            # What the ends have wrong would be drawn out over all that a filter remembers.
+            lead, rows = self._whitening.lead, self._whitening.rows(segment)
+            white = filtered(table[:, lead:-lead], self.data.rate, self._whitening.response, noisy=True)
+            parts.append(white[:, rows.start - lead : rows.stop - lead : rows.step])
+        return np.concatenate(parts, axis=1)
+
+    def both_sides(self, stage: Stage) -> tuple[Floats, Floats]:
+        """Return the force of the drive and the force that the motion needs (N, (n,)) by any `stage`.
+
+        Both below the bandwidth in which the motion stands above the sensor's noise.
+        """
+        sensors = [e for e in stage.chain if e.place is Place.SENSOR]
+        chain = [e for e in stage.chain if e.place is Place.DRIVE]
+        given, needed = [], []
+        for s, p in zip(self.data.segments, self.paths(sensors), strict=True):
+            held = self._given(s)
+            parts = parts_of_drive(chain) if self.data.held else 1
+            over = forces(stage, chain, s.time, p.x, p.v, p.a, held, parts=parts).drive
+            f = forces(stage, stage.chain, s.time, p.x, p.v, p.a, held, self.grain)
+            mean = 0.5 * (over + np.append(over[1:], over[-1:])) if self.data.held else around_rows(over)
+            given.append(mean)
+            needed.append(f.mass * p.measured - f.others())
+        return self.smooth(given), self.smooth(needed)
+
+    @property
+    def force_bandwidth(self) -> float:
+        """Hz, up to which the drive's force stands above what the sensor's noise makes of the residual."""
+        frequency, density = spectrum(self._drive_side([], []), self.data.rate)
+        noise = 1.0 / (self.whitening.white(frequency) ** 2 * 0.5 * self.data.rate)
+        below = np.flatnonzero(density < noise)
+        return float(frequency[max(below[0] - 1, 0) if below.size else -1])
+
+    def drive_force(self) -> Floats:
+        """Return the force of the believed drive (N, (n,)) below the motion's bandwidth."""
+        found: Floats = self._cache.of(("drive",), lambda: [self.both_sides(self.stage)[0]])[0]
+        return found
+
+    def smooth(self, signals: Sequence[Floats]) -> Floats:
+        """Return signals (K,), one a segment, below the motion's bandwidth on the compared rows, (n,)."""
+        parts = []
+        for segment, s in zip(self.data.segments, signals, strict=True):
+            lead, rows = self.whitening.lead, self.whitening.rows(segment)
+            below = filtered(s[lead:-lead], self.data.rate, self.noise.wiener, noisy=True)
+            parts.append(below[rows.start - lead : rows.stop - lead : rows.step])
+        return np.concatenate(parts)
+
+    def plain(self, signals: Sequence[Floats]) -> Floats:
+        """Return one unfiltered number a compared row, (n,), of signals (K,), one a segment."""
+        assert self._whitening is not None
+        pairs = zip(self.data.segments, signals, strict=True)
+        return np.concatenate([s[self._whitening.rows(segment)] for segment, s in pairs])
+
+
+def reserved_blocks(count: int, *unlike: Collection[int]) -> np.ndarray:
+    """Return which of `count` blocks are reserved, (count,) bool: of every few the middle one, if it may be.
+
+    Where that is `unlike` the others, the next that is not. Where no block would be left, the last of the
+    reasons does not count.
+    """
+    found = np.zeros(count, dtype=np.bool_)
+    besides = {block for some in unlike for block in some}
+    middle = RESERVED_EVERY // 2
+    for first in range(0, count - middle, RESERVED_EVERY):
+        group = list(range(first, min(first + RESERVED_EVERY, count)))
+        free = [b for b in group[middle:] + group[:middle] if b not in besides]
+        found[free[:1]] = True
+    return found if found.any() or not unlike else reserved_blocks(count, *unlike[:-1])
+
+
+__all__ = ["BASE", "ForceBalance", "System"]

@@ -1,0 +1,149 @@
+"""What a recording cannot tell apart: the model confidence set of the chosen model and its neighbours."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.candidates import candidates, started
+from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.fitted import Fitted
+from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.replicates import best, free_columns
+from rtcomp.diagnosis.screening import Screen
+from rtcomp.diagnosis.selection import Search
+from rtcomp.diagnosis.settings import ALIAS
+from rtcomp.diagnosis.significance import confidence_set, log_gain, probabilities
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats
+
+SET_LEVEL = 0.05
+"""Level of the confidence set."""
+CELLS = 10
+"""Parts of a block over which models are compared: each with many rows, together many."""
+NEAR = 0.5
+"""Part of the best screened gain from which on a candidate is fitted in another's place."""
+
+
+@dataclass(frozen=True)
+class Alternatives:
+    """One effect of the chosen model and what could stand in its place."""
+
+    term: Term
+    names: tuple[str, ...]
+    """All that cannot be told apart, likeliest first: what has more parameters and is no likelier by them is
+    no other explanation."""
+    probability: float
+    """That the truth is among them, if it is among all that was fitted."""
+    gain: float
+    """Squared error that the effect takes away, over that of the chosen model without it."""
+    models: tuple[Fitted, ...]
+    """The models of `names` in that order."""
+
+
+def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternatives]:
+    """Return the chosen effects, each with its set; stops looking at the time `ends`.
+
+    Where a plainer model that is likelier cannot be told from the chosen one, it is chosen from then on.
+    """
+    done: list[Alternatives] = []
+    while len(done) < len(found.chosen.terms):
+        chosen, i = found.chosen, len(done)
+        rest = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
+        models = [chosen, *_others(fitter, found, i, rest, ends)]
+        errors = [_by_cell(fitter, m) for m in models]
+        weight = probabilities(errors, _independent(fitter, chosen) / errors[0].size)
+        alike = confidence_set(errors, SET_LEVEL)
+        plainer = min(alike, key=lambda k: (models[k].size, -weight[k]))
+        if models[plainer].size < chosen.size and weight[plainer] > weight[0]:
+            found.alternatives = [m for m in found.alternatives if m is not models[plainer]] + [chosen]
+            found.chosen, found.beside, done = models[plainer], None, []
+            continue
+        best_gain = log_gain(rest.errors, chosen.errors)
+        least = (1.0 - ALIAS) * best_gain
+        members = {*alike, *(k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least)}
+        plainest = min(models[k].size for k in members)
+        enough = max(weight[k] for k in members if models[k].size == plainest)
+        members = {k for k in members if models[k].size == plainest or weight[k] > enough} | {0}
+        order = sorted(members, key=lambda k: (-weight[k], k))
+        names = [_replaced(models[k], chosen, i) for k in order]
+        kept = [j for j, n in enumerate(names) if n not in names[:j]]
+        gain = 1.0 - float(chosen.errors.sum() / rest.errors.sum())
+        done.append(
+            Alternatives(
+                chosen.terms[i],
+                tuple(names[j] for j in kept),
+                float(min(sum(weight[k] for k in order), 1.0)),
+                gain,
+                tuple(models[order[j]] for j in kept),
+            )
+        )
+    return done
+
+
+def _by_cell(fitter: Fitter, model: Fitted) -> Floats:
+    """Return the squared error of a model in every cell that is not reserved, (C,).
+
+    What acts now and then, as a drive's limit, shows in some of them: of ten blocks it would be by chance.
+    """
+    block = fitter.block
+    cell = np.arange(block.size) * (fitter.blocks * CELLS) // block.size
+    used = fitter.use[block]
+    found = np.bincount(cell[used], model.residual[used] ** 2, fitter.blocks * CELLS)
+    return np.asarray(found[np.bincount(cell[used], minlength=found.size) > 0] + 1e-300)
+
+
+def _independent(fitter: Fitter, model: Fitted) -> float:
+    """Return of how many independent rows the sum of squares of a model's residual tells as much.
+
+    n / (1 + 2 sum of rho_k^2) by the autocorrelation rho, here from its spectrum (Bayley and Hammersley 1946,
+    Suppl. J. R. Stat. Soc. 8(2)).
+    """
+    rest = model.residual[fitter.rows]
+    power = np.abs(np.fft.rfft(rest)) ** 2
+    return float(min(2.0 * np.sum(power) ** 2 / max(float(np.sum(power**2)), 1e-300), rest.size))
+
+
+def _replaced(model: Fitted, chosen: Fitted, at: int) -> str:
+    """Return the name that stands in the place of the chosen model's effect."""
+    if model is chosen:
+        return str(chosen.terms[at].entry["name"])
+    return str(model.terms[-1].entry["name"])
+
+
+def _others(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -> list[Fitted]:
+    """Return models with another effect in the place of one of the chosen."""
+    chosen = found.chosen
+    name = chosen.terms[at].entry["name"]
+    kept = sorted(ent.names(rest.entries))
+    known = [
+        m
+        for m in found.alternatives
+        if sorted(ent.names(m.entries)[:-1]) == kept and m.terms[-1].entry["name"] != name and not m.at_bound
+    ]
+    if known or time.monotonic() > ends:
+        return known
+    made = candidates(fitter, rest, [*ent.names(rest.entries), str(name)])
+    screened = Screen(made, fitter.block, fitter.blocks, fitter.use).gains(free_columns(rest), rest.residual)
+    least = NEAR * log_gain(rest.errors, chosen.errors)
+    tried = [
+        k for k in best([c.family for c in made], [s.gain for s in screened], 3) if screened[k].gain > least
+    ]
+    return _fitted(fitter, rest, [started(made[k], screened[k].sizes) for k in tried], ends)
+
+
+def _fitted(fitter: Fitter, rest: Fitted, terms: Sequence[Term], ends: float) -> list[Fitted]:
+    def fit(term: Term) -> Fitted | None:
+        if time.monotonic() > ends:
+            return None
+        try:
+            return fitter.fit([*rest.terms, term], rest)
+        except (ConfigError, np.linalg.LinAlgError):
+            return None
+
+    return [m for m in shared(fit, terms) if m is not None and not m.at_bound]

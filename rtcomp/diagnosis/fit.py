@@ -1,0 +1,319 @@
+"""Fit of a model: linear coefficients and nonlinear parameters together, and its error on blocks left out.
+
+Variable projection (Golub and Pereyra 1973): a step moves the nonlinear parameters by Gauss and Newton with
+the linear coefficients free, then these are solved again within their bounds. Blocks are left out on the
+problem linearised there, with all parameters refitted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.balance import BASE, ForceBalance, System
+from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.data import Data
+from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.fitted import Fitted, left_out
+from rtcomp.diagnosis.free import Free, Term, free_of
+from rtcomp.diagnosis.regression import Grams, Prior
+from rtcomp.diagnosis.result import PositionFit
+from rtcomp.diagnosis.retuned import level_and_reach
+from rtcomp.diagnosis.settings import BELIEF_SD
+from rtcomp.diagnosis.stage_of import stage_of
+from rtcomp.diagnosis.where import as_force
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats
+from rtcomp.physics import Effect
+from rtcomp.stage.stage import Stage
+
+STEPS = 10
+"""Gauss-Newton steps at most."""
+SETTLED = 1e-4
+"""Relative gain of a step below which the fit ends."""
+
+
+class Fitter:
+    """One objective, here the force balance: what a model leaves of it, and fits of models to it."""
+
+    gridded = True
+    """Whether friction is a grid of units, which are put to where a model has it."""
+
+    def __init__(self, balance: ForceBalance) -> None:
+        self.balance = balance
+        self.offset = False
+        """Whether a constant force that nobody believes is fitted beside every model."""
+        self._believed = [Term.of(e) for e in balance.believed]
+
+    @property
+    def use(self) -> np.ndarray:
+        """Blocks to fit, (blocks,) bool: those that are not reserved."""
+        return ~self.balance.reserved
+
+    @property
+    def block(self) -> np.ndarray:
+        """Block of each row of the residual, (n,), sorted."""
+        return self.balance.block
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return self.balance.blocks
+
+    @property
+    def rows(self) -> np.ndarray:
+        """Rows of the residual that are not reserved, (n,) bool."""
+        return np.asarray(self.use[self.block])
+
+    @property
+    def power(self) -> float:
+        """Squared residual of blocks that are not reserved if nothing at all were explained."""
+        return self.balance.power
+
+    def linear(self, kind: type[Effect]) -> bool:
+        """Tell whether the sizes of an effect are coefficients, so that any start value of them will do."""
+        return ent.adds_force(kind)
+
+    def judges(self, kind: type[Effect]) -> bool:
+        """Tell whether the objective can tell an effect at all."""
+        return True
+
+    def rough(self, model: Fitted, terms: Sequence[Term], count: int, ends: float) -> list[Term]:
+        """Return the `count` of `terms`, the likeliest first, that are worth a full fit beside a model."""
+        return list(terms[:count])
+
+    def units(self, entries: Sequence[Entry]) -> Floats:
+        """Return the columns (q, n) of unit sizes of the last of `entries`, which is `linear`."""
+        return self.balance.forces_of(entries)
+
+    def change(self, model: Fitted, entry: Entry) -> Floats:
+        """Return by how much more a model accounts for with an entry at work, (n,), coefficients held."""
+        b = self.balance
+        return model.residual - b.error([*model.entries, entry], model.coefficients, model.weights)
+
+    def stage(self, model: Fitted, *, between: bool = False) -> Stage:
+        """Return a model as a stage; `between`: with friction that its own grid does not quite reach."""
+        return stage_of(self.balance, model, between=between)
+
+    def force(self, model: Fitted) -> Floats:
+        """Return the force (N) that a model leaves open on the compared rows of the balance."""
+        return as_force(self.balance, model.residual)
+
+    def without(self, model: Fitted, at: int) -> Floats:
+        """Return the force (N) that a model leaves open without its effect number `at`, others as are."""
+        b = self.balance
+        others = [*model.entries[:at], *model.entries[at + 1 :]]
+        span = model.system.of_entry[len(b.believed) + at]
+        c = np.delete(model.coefficients, np.arange(span.start, span.stop))
+        return as_force(b, b.error(others, c, model.weights))
+
+    def relative(self, model: Fitted) -> float:
+        """Return what a model leaves over what there is to explain, rms of both, without the reserved."""
+        rows = ~self.balance.reserved[self.balance.block]
+        power = float(np.mean(self.balance.drive_force()[rows] ** 2))
+        return float(np.sqrt(np.mean(self.force(model)[rows] ** 2) / max(power, 1e-300)))
+
+    def relative_of(self, stage: Stage) -> float:
+        """Return the same of any stage as it is."""
+        drive, needed = self.balance.both_sides(stage)
+        rows = ~self.balance.reserved[self.balance.block]
+        power = float(np.mean(drive[rows] ** 2))
+        return float(np.sqrt(np.mean((drive - needed)[rows] ** 2) / max(power, 1e-300)))
+
+    def has_offset(self, model: Fitted) -> bool:
+        """Tell whether a model has a constant force beside its entries."""
+        return bool(model.coefficients[self.balance.size - 1] != 0.0)
+
+    def above_noise(self, model: Fitted) -> float:
+        """Return that relative error (rms) as far as the sensor's noise does not account for it."""
+        power = float(np.mean(self.balance.drive_force() ** 2))
+        noise = self.balance.noise_power / max(power, 1e-300)
+        return float(np.sqrt(max(self.relative(model) ** 2 - noise, 0.0)))
+
+    def numbers(self, model: Fitted, *, effects: bool) -> tuple[Floats, Floats, Floats]:
+        """Return mass, damping, level and reach of friction, and sizes of believed `effects` by amount.
+
+        Those of the model, (q,), without each block, (B_use, q), and the believed sizes with their signs.
+        """
+        b = self.balance
+        sizes = np.concatenate([np.zeros(0), *(ent.sizes_of(e) for e in b.believed if effects)])
+        own = slice(b.size, b.size + sizes.size)
+        sign = np.where(sizes < 0.0, -1.0, 1.0)
+
+        def of(c: Floats) -> Floats:
+            elements = list(zip(c[b.friction], b.reaches, strict=True))
+            return np.array([*c[: len(BASE)], *level_and_reach(elements), *(sign * c[own])])
+
+        return of(model.coefficients), np.array([of(c) for c in model.without]), sizes
+
+    def position(self, before: Stage, retuned: Stage, after: Stage, seed: int) -> PositionFit | None:
+        """Return errors of position on the reserved part; None where forces judge."""
+        return None
+
+    def on(self, data: Data) -> Fitter:
+        """Return the same objective on other data of equal length: a replicate."""
+        other = Fitter(self.balance.on(data))
+        other.offset = self.offset
+        return other
+
+    def prior(self, system: System, terms: Sequence[Term]) -> Prior:
+        """Return what is believed of the columns: mass, damping near the belief, no negative stiffness."""
+        balance, m = self.balance, self.balance.stage.mechanics
+        size = system.columns.shape[0]
+        mean, precision = np.zeros(size), np.zeros(size)
+        low, high = np.full(size, -np.inf), np.full(size, np.inf)
+        low[: balance.size] = 0.0
+        for i, value in enumerate((m.mass, m.viscous, m.micro_damping)):
+            if value > 0.0:
+                mean[i], precision[i] = value, (BELIEF_SD * value) ** -2
+            elif balance.without(BASE[i]):
+                high[i] = 0.0
+        low[0] = 1e-3 * m.mass
+        if balance.believed_speed is None:
+            high[balance.faster] = 0.0
+        else:
+            off = math.log(balance.believed_speed / m.micro_damping_speed)
+            mean[balance.faster], low[balance.faster] = m.micro_damping * off, -np.inf
+            precision[balance.faster] = (BELIEF_SD * m.micro_damping) ** -2
+        if self.offset and not balance.biased and not any(ent.kind_of(t.entry).bias for t in terms):
+            low[balance.size - 1] = -np.inf
+        else:
+            high[balance.size - 1] = 0.0
+        for term, span in zip([*self._believed, *terms], system.of_entry, strict=True):
+            if span.stop > span.start:
+                low[span], high[span] = ent.bounds_of(term.entry)
+        for term, span in zip(self._believed, system.of_entry, strict=False):
+            sizes = ent.sizes_of(term.entry)
+            near = sizes != 0.0
+            where = np.arange(span.start, span.stop)
+            mean[where[near]] = sizes[near]
+            precision[where[near]] = (BELIEF_SD * np.abs(sizes[near])) ** -2
+        return Prior(mean, precision, low, high)
+
+    def solve(
+        self, terms: Sequence[Term], weights: Floats, variance: float
+    ) -> tuple[System, Prior, Grams, Floats, float]:
+        """Return the system of `terms`, its prior, statistics, coefficients and squared error in sample."""
+        b = self.balance
+        system = b.system([t.entry for t in terms], weights)
+        prior = self.prior(system, terms)
+        grams = Grams.of(system.columns, system.y, b.block, b.blocks)
+        c = grams.solve(self.use, prior, variance)
+        return system, prior, grams, c, float(grams.errors(c, self.use).sum())
+
+    def quick(self, terms: Sequence[Term]) -> float:
+        """Return the squared error in sample of `terms` as they are, with believed friction at work."""
+        weights = self.balance.weights
+        for _ in range(2):
+            _, _, _, c, sse = self.solve(terms, weights, 1.0)
+            weights = c[self.balance.friction]
+        return sse
+
+    def fit(self, terms: Sequence[Term], start: Fitted | None = None, steps: int = STEPS) -> Fitted:
+        """Fit a model from the values that its terms have; raise ConfigError where these are impossible."""
+        b = self.balance
+        current = list(terms)
+        weights = b.weights
+        if start is not None and start.weights.size == b.reaches.size and not _newly_behind(terms, start):
+            weights = start.weights
+        rows = np.isin(b.block, np.flatnonzero(self.use))
+        variance = 1.0 if start is None else start.variance
+        for _ in range(2):
+            system, prior, _, c, sse = self.solve(current, weights, variance)
+            variance = sse / max(int(rows.sum()), 1)
+            weights = c[b.friction]
+        free = free_of(current, b)
+        damping = 1e-3
+        tangents = np.zeros((0, system.y.size))
+        for _ in range(steps if free else 0):
+            tangents = self._tangents(current, free, system, c, weights)
+            wide = prior.extended(np.full(len(free), -np.inf), np.full(len(free), np.inf))
+            joint = Grams.of(np.concatenate([system.columns, tangents]), system.y, b.block, b.blocks)
+            power = np.diag(joint.gram[self.use].sum(axis=0))[c.size :]
+            improved = False
+            for _ in range(4):
+                held = np.concatenate([wide.precision[: c.size], damping * power / max(variance, 1e-300)])
+                moved = joint.solve(self.use, Prior(wide.mean, held, wide.low, wide.high), variance)[c.size :]
+                trial = list(current)
+                for f, step in zip(free, moved.tolist(), strict=True):
+                    f.put(trial, f.get(current) + min(max(step, -f.most(current)), f.most(current)))
+                try:
+                    found = self.solve(trial, weights, variance)
+                except ConfigError:
+                    damping *= 10.0
+                    continue
+                if found[-1] < sse:
+                    improved = True
+                    break
+                damping *= 10.0
+            if not improved:
+                break
+            gained = 1.0 - found[-1] / sse
+            current = trial
+            system, prior, _grams, c, sse = found
+            weights = c[b.friction]
+            variance = sse / max(int(rows.sum()), 1)
+            damping = max(0.1 * damping, 1e-6)
+            free = free_of(current, b)
+            if gained < SETTLED:
+                break
+        return self._finished(current, free, system, prior, c, sse, variance, weights)
+
+    def _finished(
+        self,
+        terms: list[Term],
+        free: list[Free],
+        system: System,
+        prior: Prior,
+        c: Floats,
+        sse: float,
+        variance: float,
+        weights: Floats,
+    ) -> Fitted:
+        b = self.balance
+        tangents = self._tangents(terms, free, system, c, weights)
+        wide = prior.extended(np.full(len(free), -np.inf), np.full(len(free), np.inf))
+        joint = Grams.of(np.concatenate([system.columns, tangents]), system.y, b.block, b.blocks)
+        whole = np.concatenate([c, np.zeros(len(free))])
+        errors, without = left_out(joint, self.use, wide, variance, whole)
+        done = []
+        for term, span in zip(terms, system.of_entry[len(self._believed) :], strict=True):
+            sizes = c[span]
+            done.append(term.with_entry(ent.composed(term.entry, sizes)) if sizes.size else term)
+        residual = system.y - c @ system.columns
+        return Fitted(
+            tuple(done), c, system, prior, residual, tangents, tuple(free), errors, without, sse, variance,
+            weights,
+        )  # fmt: skip
+
+    def _tangents(
+        self, terms: list[Term], free: Sequence[Free], system: System, c: Floats, weights: Floats
+    ) -> Floats:
+        """Return what the model changes by with each free parameter, (q, n), coefficients held."""
+        rest = system.y - c @ system.columns
+
+        def one(f: Free) -> Floats:
+            for way in (1.0, -1.0):
+                trial = list(terms)
+                f.put(trial, f.get(terms) + way * f.step)
+                moved = f.get(trial) - f.get(terms)
+                if moved == 0.0:
+                    continue
+                try:
+                    other = self.balance.error([t.entry for t in trial], c, weights)
+                except ConfigError:
+                    continue
+                return (rest - other) / moved
+            return np.zeros_like(rest)
+
+        return np.array(shared(one, free)) if free else np.zeros((0, system.y.size))
+
+
+def _newly_behind(terms: Sequence[Term], start: Fitted) -> bool:
+    """Tell whether friction comes to be behind a play, which a fit without one takes for longer reaches."""
+    return any(ent.kind_of(t.entry).behind for t in terms) and not any(
+        ent.kind_of(t.entry).behind for t in start.terms
+    )

@@ -1,0 +1,83 @@
+"""A model fitted to an objective, and what it makes of blocks left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtcomp.diagnosis.balance import System
+from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.free import Free, Term
+from rtcomp.diagnosis.regression import Grams, Prior
+from rtcomp.kernels import Floats
+
+ONCE = 0.5
+"""Part of a column's power in one block, from which on the other blocks cannot tell its size."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A model fitted on the blocks that are not reserved."""
+
+    terms: tuple[Term, ...]
+    coefficients: Floats
+    """(p,): base, then sizes of entries that add a force, in the units of the columns."""
+    system: System
+    prior: Prior
+    residual: Floats
+    """(n,), whitened, all rows."""
+    tangents: Floats
+    """(q, n): change of the model with each free nonlinear parameter (on its scale)."""
+    free: tuple[Free, ...]
+    errors: Floats
+    """(B_use,): squared error of each block left out."""
+    without: Floats
+    """(B_use, p + q): coefficients and nonlinear changes without each block."""
+    sse: float
+    """Squared error of all blocks that are not reserved, in sample."""
+    variance: float
+    weights: Floats
+    """N/m of the friction units."""
+
+    @property
+    def size(self) -> int:
+        """Number of parameters of its effects."""
+        return sum(len(t.free) for t in self.terms)
+
+    @property
+    def at_bound(self) -> bool:
+        """Tell whether a nonlinear parameter of the last term came out at its bound."""
+        last = len(self.terms) - 1
+        return any(f.at_bound(self.terms) for f in self.free if f.term == last)
+
+    @property
+    def entries(self) -> list[Entry]:
+        """Return the entries with the values found."""
+        return [t.entry for t in self.terms]
+
+
+def left_out(
+    grams: Grams, use: np.ndarray, prior: Prior, variance: float, whole: Floats
+) -> tuple[Floats, Floats]:
+    """Return squared errors (B_use,) of blocks predicted by the others, and coefficients without each.
+
+    What happens in one block only keeps the size that it has in the `whole` fit there: other blocks cannot
+    tell it.
+    """
+    members = np.flatnonzero(use)
+    power = np.einsum("kii->ki", grams.gram[use])
+    alone = power > ONCE * np.maximum(power.sum(axis=0), 1e-300)
+    errors, found = np.empty(members.size), []
+    for i, k in enumerate(members):
+        others = use.copy()
+        others[k] = False
+        held = prior
+        if alone[i].any():
+            low, high = prior.low.copy(), prior.high.copy()
+            low[alone[i]] = high[alone[i]] = whole[alone[i]]
+            held = Prior(prior.mean, prior.precision, low, high)
+        c = grams.solve(others, held, variance)
+        errors[i] = grams.errors(c, np.array([k]))[0]
+        found.append(c)
+    return errors, np.array(found)

@@ -1,0 +1,107 @@
+"""What a fit moves: the terms of a model, and their nonlinear parameters on the scales they are moved on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.entries import Entry
+
+LONGEST = 1.25
+"""Longest period of a wave, relative to the stroke."""
+AT_BOUND = 1e-3
+"""Part of a number by which it may be away from its bound and still be at it."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """An entry in a model, and the names of its parameters that a fit moves."""
+
+    entry: Entry
+    free: frozenset[str]
+
+    @classmethod
+    def of(cls, entry: Entry) -> Term:
+        """Take all parameters that the entry states to be free."""
+        own = [*ent.free_parameters(entry, linear=True), *ent.free_parameters(entry, linear=False)]
+        return cls(entry, frozenset(p.name for p in own))
+
+    def with_entry(self, entry: Entry) -> Term:
+        """Return the term with other values."""
+        return Term(entry, self.free)
+
+
+@dataclass(frozen=True)
+class Free:
+    """A nonlinear parameter: the term and its name, how it is scaled, and its derivative's step."""
+
+    term: int
+    name: str
+    low: float
+    high: float
+    log: bool
+    step: float
+
+    def get(self, terms: Sequence[Term]) -> float:
+        """Return its value on the scale it is moved on."""
+        value = float(terms[self.term].entry[self.name])
+        return math.log(value) if self.log else value
+
+    def most(self, terms: Sequence[Term]) -> float:
+        """Return the furthest that one step of a fit may move it."""
+        return 0.7 if self.log else max(0.5 * abs(self.get(terms)), 20.0 * self.step)
+
+    def at_bound(self, terms: Sequence[Term]) -> bool:
+        """Tell whether it is as large or as small as it may be."""
+        value = float(terms[self.term].entry[self.name])
+        near = AT_BOUND * abs(value)
+        return value >= self.high - near or 0.0 < self.low >= value - near
+
+    def put(self, terms: list[Term], value: float) -> None:
+        """Give it a value on that scale, within its bounds."""
+        plain = math.exp(value) if self.log else value
+        entry = {**terms[self.term].entry, self.name: min(max(plain, self.low), self.high)}
+        terms[self.term] = terms[self.term].with_entry(entry)
+
+
+def free_of(terms: Sequence[Term], balance: ForceBalance) -> list[Free]:
+    """Return the nonlinear parameters of `terms` that a fit moves, within what the recording could show."""
+    return _free_of(terms, balance, sizes=False)
+
+
+def all_free_of(terms: Sequence[Term], balance: ForceBalance) -> list[Free]:
+    """Return all parameters of `terms` that a fit moves where none is linear."""
+    return _free_of(terms, balance, sizes=True)
+
+
+def _free_of(terms: Sequence[Term], balance: ForceBalance, *, sizes: bool) -> list[Free]:
+    low, high = balance.data.stroke
+    found = []
+    for i, term in enumerate(terms):
+        kind = ent.kind_of(term.entry)
+        waves = any(p.unit == ent.PHASE and p.name in term.entry for p in kind.parameters)
+        own = ent.free_parameters(term.entry, linear=True) if sizes else []
+        for p in [*own, *ent.free_parameters(term.entry, linear=False)]:
+            if p.name not in term.free:
+                continue
+            value, least, most = float(term.entry[p.name]), p.lowest, p.high
+            log = p.lowest >= 0.0 and value > 0.0
+            step = 0.02 if log else max(0.02 * abs(value), 1e-9 * (high - low if p.unit == "m" else 1.0))
+            if p.unit == ent.PHASE:
+                step = 0.05
+            elif p.name == ent.PERIOD:
+                # A wave longer than the stroke is a slope by another name.
+                step, most = min(0.02, 0.02 * value / (high - low)), min(p.high, LONGEST * (high - low))
+            elif p.unit == "Hz":
+                # Beyond the motion's bandwidth nothing swings that the recording could show.
+                most = min(p.high, balance.noise.bandwidth)
+                step = min(0.02, 0.01 / (value * balance.data.seconds)) if waves else step
+            elif p.unit == "s":
+                least = max(p.lowest, min(balance.data.period, value))
+            elif p.unit == "m" and p.lowest < 0.0 and p.name not in kind.linear:
+                step = 0.002 * (high - low)
+            found.append(Free(i, p.name, least, most, log, step))
+    return found

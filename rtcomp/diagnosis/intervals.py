@@ -1,0 +1,156 @@
+"""Intervals of what a fit found, by leaving blocks out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.fitted import ONCE, Fitted, left_out
+from rtcomp.diagnosis.regression import Grams
+from rtcomp.diagnosis.result import Value
+from rtcomp.diagnosis.retuned import Numbers, believed_friction
+from rtcomp.diagnosis.spread import MODEL, elsewhere, scatter
+from rtcomp.kernels import Floats
+from rtcomp.stage.stage import Stage
+from rtcomp.units import for_axis
+
+AT_BOUND = 1e-3
+"""Part of its range within which a number is at its bound."""
+
+
+@dataclass(frozen=True)
+class Told:
+    """An entry's numbers with their intervals, and what of them makes it no finding."""
+
+    values: dict[str, Value]
+    nothing: bool
+    """Every size of it may be neutral."""
+    bound: tuple[str, ...]
+    """Parameters that are at a physical bound."""
+
+
+def told(fitter: Fitter, fitted: Fitted) -> list[Told]:
+    """Return the 95 % intervals of each term's parameters.
+
+    Blocks of the recording are left out in turn (delete-a-group jackknife: Bell and McCaffrey 2002, Survey
+    Methodology 28(2)); what a single block tells is compared with the rest of the recording.
+    """
+    from scipy.stats import t as student
+
+    balance = fitter.balance
+    spans = fitted.system.of_entry[len(balance.believed) :]
+    factor = float(student.ppf(0.975, max(fitted.without.shape[0] - 1, 1)))
+    axis = balance.stage.axis
+    found = []
+    held = _shapes_held(fitter, fitted)
+    for i, (term, span) in enumerate(zip(fitted.terms, spans, strict=True)):
+        kind = ent.kind_of(term.entry)
+        without, once = _without(fitted, i, span), _once(fitter, fitted, i, span)
+        alone = _without(held, i, span)
+        values, neutral, bound = {}, [], []
+        for p in kind.parameters:
+            if p.name not in term.entry:
+                continue
+            value = float(term.entry[p.name])
+            half = 0.0
+            if p.name in without:
+                apart = without[p.name] - value
+                if p.unit == ent.PHASE:
+                    apart = (apart + np.pi) % (2.0 * np.pi) - np.pi
+                sd = _deviation(apart)
+                size = 2.0 if p.unit == ent.PHASE else abs(value)
+                half = math.hypot(factor * max(sd, once.get(p.name, 0.0)), MODEL * size)
+                if _at_bound(value, p.lowest, p.high):
+                    bound.append(p.name)
+            elif p.name == ent.MOMENT:
+                half = balance.data.period
+            low, high = max(value - half, p.low), min(value + half, p.high)
+            values[p.name] = Value(value, low, high, for_axis(p.unit, axis))
+            if p.name in kind.linear and p.name in without:
+                spread = max(_deviation(alone[p.name] - value), once.get(p.name, 0.0))
+                half = math.hypot(factor * spread, MODEL * abs(value))
+                neutral.append(abs(value - ent.neutral(kind, p.name)) <= half)
+        found.append(Told(values, bool(neutral) and all(neutral), tuple(bound)))
+    return found
+
+
+def _deviation(without: Floats) -> float:
+    """Return the standard deviation of a number found without each block in turn, (B,)."""
+    return float(np.sqrt(max(scatter(without[:, None])[0, 0], 0.0)))
+
+
+def _shapes_held(fitter: Fitter, fitted: Fitted) -> Fitted:
+    """Return the fit with only the sizes of its effects free: what is nothing has no shape."""
+    sizes = [k for k, f in enumerate(fitted.free) if f.name in ent.kind_of(fitted.entries[f.term]).linear]
+    tangents = fitted.tangents[sizes]
+    joint = np.concatenate([fitted.system.columns, tangents])
+    grams = Grams.of(joint, fitted.system.y, fitter.block, fitter.blocks)
+    wide = fitted.prior.extended(np.full(len(sizes), -np.inf), np.full(len(sizes), np.inf))
+    whole = np.concatenate([fitted.coefficients, np.zeros(len(sizes))])
+    _, without = left_out(grams, fitter.use, wide, fitted.variance, whole)
+    free = tuple(fitted.free[k] for k in sizes)
+    return replace(fitted, tangents=tangents, free=free, without=without)
+
+
+def _at_bound(value: float, low: float, high: float) -> bool:
+    near = AT_BOUND * (high - low) if high - low <= 10.0 else AT_BOUND * abs(value)
+    return value >= high - near or (low > 0.0 and value <= low + near)
+
+
+def _without(fitted: Fitted, at: int, span: slice) -> dict[str, Floats]:
+    """Return the values (B,) of each free parameter of a term without each block."""
+    term = fitted.terms[at]
+    size = fitted.coefficients.size
+    found: dict[str, Floats] = {}
+    if span.stop > span.start:
+        made = [ent.composed(term.entry, c[span]) for c in fitted.without]
+        moved = [n for n in made[0] if n in term.free and isinstance(made[0][n], float)]
+        found.update({n: np.array([m[n] for m in made]) for n in moved})
+    for k, free in enumerate(fitted.free):
+        if free.term != at:
+            continue
+        values = free.get(fitted.terms) + fitted.without[:, size + k]
+        plain = np.exp(np.minimum(values, 700.0)) if free.log else values
+        found[free.name] = np.clip(plain, free.low, free.high)
+    return found
+
+
+def _once(fitter: Fitter, fitted: Fitted, at: int, span: slice) -> dict[str, float]:
+    """Return standard deviations of numbers that one block alone tells."""
+    use = fitter.rows
+    block, rest = fitter.block[use], fitted.residual[use]
+    found: dict[str, float] = {}
+
+    def alone(column: Floats) -> bool:
+        power = np.bincount(block, column**2, fitter.blocks)
+        return bool(power.max() > ONCE * max(float(power.sum()), 1e-300))
+
+    own = [n for n in ent.kind_of(fitted.terms[at].entry).linear if n in fitted.terms[at].entry]
+    for name, column in zip(own, fitted.system.columns[span], strict=False):
+        if alone(column[use]):
+            found[name] = math.sqrt(elsewhere(column[use], rest))
+    for free, tangent in zip(fitted.free, fitted.tangents, strict=True):
+        if free.term == at and alone(tangent[use]):
+            sd = math.sqrt(elsewhere(tangent[use], rest))
+            found[free.name] = sd * (float(fitted.terms[at].entry[free.name]) if free.log else 1.0)
+    return found
+
+
+def numbers(fitter: Fitter, believed: Stage, fitted: Fitted, *, effects: bool = False) -> Numbers:
+    """Return mass, damping, level and reach of friction, believed and found, with their half widths.
+
+    With `effects`, the sizes of forces that believed effects add as well, by amount.
+    """
+    from scipy.stats import t as student
+
+    values, sets, sizes = fitter.numbers(fitted, effects=effects)
+    spread = np.maximum(np.diag(scatter(sets)), 0.0)
+    factor = float(student.ppf(0.975, max(sets.shape[0] - 1, 1)))
+    half = np.sqrt(factor**2 * spread + (MODEL * values) ** 2)
+    m = believed.mechanics
+    before = np.array([m.mass, m.viscous, m.micro_damping, *believed_friction(believed), *np.abs(sizes)])
+    return Numbers(before, values, half)

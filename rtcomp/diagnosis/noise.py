@@ -1,0 +1,90 @@
+"""What the sensor puts into the residual: the density of its noise, and the weight of every frequency."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtcomp.diagnosis.data import Data, Segment
+from rtcomp.diagnosis.spectrum import Response, interpolated, spectrum
+from rtcomp.kernels import Floats
+from rtcomp.stage.stage import Stage
+
+TOP = 0.1
+"""Weight, relative to the largest, below which a frequency is left out of the table of rows."""
+
+LEAD = 2
+"""Rows at the ends of a segment that second differences do not do justice to."""
+RINGING = 100
+"""Rows at the ends of a band-limited segment that derivatives do not do justice to."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of the position, and the smoothing that follows from it."""
+
+    rms: float
+    """m, white, at the recording's rate."""
+    wiener: Response
+    """Share of the position's power that is signal, by frequency: Wiener's filter (1949)."""
+    bandwidth: float
+    """Hz, up to which signal is at least as strong as noise."""
+
+    @classmethod
+    def of(cls, stage: Stage, data: Data) -> Noise:
+        """Take the noise that the stage states, within what the recording can have; else the recording's.
+
+        Noise that is larger than all there is at some frequency is not there; where a stage says nothing,
+        the weakest band of the spectrum tells how much there can be.
+        """
+        frequency, density = spectrum([s.position for s in data.segments], data.rate)
+        most = float(np.sqrt(density.min() * 0.5 * data.rate))
+        stated = float(np.hypot(stage.sensor.noise, stage.sensor.resolution / np.sqrt(12.0)))
+        rms = min(max(stated, 0.1 * most), most) if stated > 0.0 else most
+        floor = rms**2 / (0.5 * data.rate)
+        share = np.maximum(1.0 - floor / density, 0.0)
+        # Once lost in noise, higher bands are only chance.
+        lost = np.flatnonzero(share < 0.5)
+        last = int(lost[0]) if lost.size else share.size - 1
+        share[last + 1 :] = np.minimum(share[last + 1 :], 1e-3)
+        share = np.maximum(share, 1e-6)
+        return cls(rms, interpolated(frequency, share), float(frequency[last]))
+
+
+@dataclass(frozen=True)
+class Whitening:
+    """Weight of each frequency of the residual, and every how manieth row is enough of what is left."""
+
+    response: Response
+    white: Response
+    """The first of its two factors: one over the amplitude density of noise in the residual."""
+    thinning: int
+    lead: int
+    """Rows at both ends of a segment whose derivatives are not right: cut before filtering."""
+    edge: int
+    """Rows at both ends of a segment that are left out, those included."""
+
+    @classmethod
+    def of(cls, noise: Noise, data: Data, shaken: list[Floats]) -> Whitening:
+        """Weigh by signal over noise: `shaken` (N, a segment each) is what noise does to the residual.
+
+        Residuals are divided by the amplitude density of that, so that all frequencies are equally noisy,
+        and multiplied by the share of the position that is signal.
+        """
+        frequency, density = spectrum(shaken, data.rate)
+        white = interpolated(frequency, 1.0 / np.sqrt(density * 0.5 * data.rate))
+
+        def response(at: Floats) -> Floats:
+            return white(at) * noise.wiener(at)
+
+        above = np.flatnonzero(noise.wiener(frequency) > TOP)
+        high = float(frequency[above[-1]]) if above.size else float(frequency[-1])
+        thinning = max(1, int(data.rate / (2.5 * high)))
+        lead = LEAD if data.held else RINGING
+        return cls(response, white, thinning, lead, lead + max(1, int(2.0 * data.rate / high)))
+
+    def rows(self, segment: Segment) -> slice:
+        """Return the rows of a segment that are compared."""
+        first = max(self.edge, segment.run_in)
+        return slice(first, max(segment.time.size - self.edge, first + 1), self.thinning)

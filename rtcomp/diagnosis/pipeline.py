@@ -1,0 +1,192 @@
+"""The diagnosis from top to bottom: data, objective, baseline, candidates, test, search, set, judgement."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rtcomp.diagnosis.answer import answer
+from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.baseline import baseline, settle, with_offset
+from rtcomp.diagnosis.confidence import alternatives
+from rtcomp.diagnosis.data import load_data
+from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.fitted import Fitted
+from rtcomp.diagnosis.locate import locate
+from rtcomp.diagnosis.noise import Noise
+from rtcomp.diagnosis.result import Diagnosis, Place
+from rtcomp.diagnosis.selection import Look, Search, look, search
+from rtcomp.diagnosis.settings import BUDGET
+from rtcomp.diagnosis.sticking import MUCH, mostly_hidden
+from rtcomp.diagnosis.trajectory import Trajectory
+from rtcomp.diagnosis.validation import Reserved
+from rtcomp.diagnosis.where import Compared, as_force
+from rtcomp.errors import RtcompError
+from rtcomp.recording.reader import Recording
+from rtcomp.stage.stage import Stage
+
+Progress = Callable[[float, str], None]
+STICKS = (
+    "the axis sticks finer than a count of its sensor in {:.0f} % of the rows, where motion tells nothing of "
+    "friction: judged by position, simulated over {:.2g} s from points of the recording"
+)
+SEARCH, TELL_APART = 0.75, 0.9
+"""Parts of the budget at which the search ends, and what then tells its models apart."""
+BAND_LIMITED = "the command is taken as band-limited between rows, which fits better than held"
+LOUD = 0.03
+"""Relative force error of noise alone, from which on forces do not judge an axis that mostly sticks."""
+Located = Callable[[float, Sequence[Place]], None]
+"""Told, before anything is named, what part of the force the refitted stage leaves open (rms), and where."""
+
+
+def diagnose(
+    stage: Stage,
+    recordings: Sequence[Recording],
+    *,
+    held: bool | None = None,
+    budget: float = BUDGET,
+    progress: Progress | None = None,
+    located: Located | None = None,
+    seed: int = 0,
+) -> Diagnosis:
+    """Say where `stage` and `recordings` (of one rate) differ, what is missing, and what it explains.
+
+    `held` tells whether the command is held from row to row or goes on between rows as a band-limited
+    signal; None where both are to be tried. `budget` (s) ends the search with the best answer so far.
+    `progress` hears how far each step is, `located` the places of the mismatch before anything is named.
+    Raises RtcompError where the budget does not do for the baseline.
+    """
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1, user_api="blas"):  # the cores are shared out by `cores`
+        return _diagnosed(stage, recordings, held, budget, progress, located, seed)
+
+
+def _diagnosed(
+    stage: Stage,
+    recordings: Sequence[Recording],
+    held: bool | None,
+    budget: float,
+    progress: Progress | None,
+    located: Located | None,
+    seed: int,
+) -> Diagnosis:
+    say: Progress = progress or (lambda _part, _what: None)
+    ends = time.monotonic() + budget
+    say(0.0, "balance")
+    objectives = _objectives(stage, recordings, held)
+    if time.monotonic() > ends:
+        raise RtcompError(f"the budget of {budget:g} s ended before the stage was refitted; give it more")
+    balance, base = objectives[0].balance, objectives[0].base
+    reserved = Reserved(balance)
+    view = Compared(balance)
+    before = as_force(balance, base.residual)
+    if located is not None:
+        left = (base.sse / max(balance.power, 1e-300)) ** 0.5
+        located(left, locate(view, before, None, seed, stage.axis))
+    say(1.0, "balance")
+    unseen = mostly_hidden(stage, recordings)
+    if unseen > MUCH and _loud(balance):
+        objectives = [_by_trajectory(objectives[0])]
+    fitter, found = _searched(objectives, ends - (1.0 - SEARCH) * budget, say, seed)
+    say(0.0, "tell apart")
+    sets = alternatives(fitter, found, ends - (1.0 - TELL_APART) * budget)
+    say(0.5, "judge")
+    if fitter.balance is not balance:
+        reserved = Reserved(fitter.balance)
+    done = answer(stage, fitter, found, sets, reserved, seed, late=time.monotonic() > ends)
+    say(1.0, "judge")
+    notes = [BAND_LIMITED] if len(objectives) > 1 and not fitter.balance.data.held else []
+    notes += [STICKS.format(100.0 * unseen, done.position.seconds)] if done.position is not None else []
+    notes += [f"not tried within {budget:g} s: {what}" for what in found.not_tried]
+    return replace(done, notes=[*notes, *done.notes], not_tried=found.not_tried)
+
+
+def _loud(balance: ForceBalance) -> bool:
+    """Tell whether noise alone leaves so much force that it is no judge of an axis that mostly sticks."""
+    rows = ~balance.reserved[balance.block]
+    return balance.noise_power > LOUD**2 * float(np.mean(balance.drive_force()[rows] ** 2))
+
+
+def _by_trajectory(by_force: Objective) -> Objective:
+    """Return the objective that judges by simulated position, on the same blocks."""
+    believed = by_force.balance.stage
+    if believed.friction is None:
+        believed = by_force.fitter.stage(by_force.base)
+    fitter = Trajectory.of(by_force.balance, believed)
+    return Objective(fitter, fitter.fit([]))
+
+
+@dataclass(frozen=True)
+class Objective:
+    """One way to take the command: its force balance, the refitted stage, a look at all candidates."""
+
+    fitter: Fitter
+    base: Fitted
+    first: Look | None = None
+
+    @property
+    def balance(self) -> ForceBalance:
+        """Its force balance."""
+        return self.fitter.balance
+
+
+def _objectives(stage: Stage, recordings: Sequence[Recording], held: bool | None) -> list[Objective]:
+    """Return the objective of each way to take the command, the better first.
+
+    A loop holds its command from row to row. Where there is no reference the command may be a measured signal
+    that goes on between rows: both ways are looked at, each with the best candidate beside it.
+    """
+    looped = all(r.reference is not None for r in recordings)
+    ways = ([True] if looped else [True, False]) if held is None else [held]
+    made = []
+    for way in ways:
+        data = load_data(recordings, held=way)
+        bandwidth = Noise.of(stage, data).bandwidth
+        balance = ForceBalance(stage, load_data(recordings, held=way, bandwidth=bandwidth))
+        base = baseline(balance)
+        fitter = Fitter(balance)
+        made.append(Objective(fitter, with_offset(fitter, base)))
+    if len(made) == 1:
+        return made
+    looked = [replace(one, first=look(one.fitter, one.base)) for one in made]
+    return sorted(looked, key=_left_beside)
+
+
+def _left_beside(one: Objective) -> float:
+    """Return the logarithm of what the best candidate leaves, to first order."""
+    return _left(one.balance, one.base) - (one.first.gain if one.first is not None else 0.0)
+
+
+def _left(balance: ForceBalance, model: Fitted) -> float:
+    """Return the logarithm of what a model leaves of the drive's force."""
+    return float(np.mean(np.log(model.errors / balance.power)))
+
+
+def _searched(
+    objectives: Sequence[Objective], ends: float, say: Progress, seed: int
+) -> tuple[Fitter, Search]:
+    """Return the search on the first objective, or on the second where a model found fits better there.
+
+    What is missing may hide which way the command goes between rows, and the wrong way looks like a delay.
+    """
+    best = objectives[0]
+
+    def doubted(model: Fitted) -> bool:
+        other = Fitter(objectives[1].balance)
+        left = []
+        for terms in (model.terms, model.terms[:-1]):
+            settle(other, terms)
+            left.append(_left(other.balance, other.fit(terms)))
+        return min(left) < _left(best.balance, model)
+
+    doubt = doubted if len(objectives) > 1 else None
+    found = search(best.fitter, best.base, ends, say, seed, doubt, best.first)
+    if not found.doubted:
+        return best.fitter, found
+    fitter = Fitter(objectives[1].balance)
+    settle(fitter)
+    return fitter, search(fitter, with_offset(fitter, fitter.fit([])), ends, say, seed)

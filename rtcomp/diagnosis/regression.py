@@ -1,0 +1,96 @@
+"""Bounded least squares over blocks with a prior: fitted on some blocks, validated on the others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from rtcomp.diagnosis.bounded import bounded_minimum
+from rtcomp.kernels import Floats
+
+RIDGE = 1e-9
+"""Part of the columns' mean power that is added to each: columns alike share what they explain."""
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is believed of the coefficients: mean and precision (p,); precision 0 is no belief. And bounds."""
+
+    mean: Floats
+    precision: Floats
+    low: Floats
+    high: Floats
+
+    def extended(self, low: Floats, high: Floats) -> Prior:
+        """Return the prior with further coefficients of which only bounds are known."""
+        none = np.zeros(low.size)
+        join = np.concatenate
+        return Prior(
+            join([self.mean, none]),
+            join([self.precision, none]),
+            join([self.low, low]),
+            join([self.high, high]),
+        )
+
+
+@dataclass(frozen=True)
+class Grams:
+    """Sufficient statistics of ``y = A c`` by block."""
+
+    gram: Floats
+    """(B, p, p)."""
+    cross: Floats
+    """(B, p)."""
+    power: Floats
+    """(B,)."""
+    rows: Floats
+    """(B,)."""
+
+    @classmethod
+    def of(cls, columns: Floats, y: Floats, block: np.ndarray, count: int) -> Grams:
+        """Gather from columns (p, n), y (n,) and the sorted block number of every row (n,)."""
+        edges = np.searchsorted(block, np.arange(count + 1))
+        gram, cross, power = [], [], []
+        for first, last in pairwise(edges):
+            part, target = columns[:, first:last], y[first:last]
+            gram.append(part @ part.T)
+            cross.append(part @ target)
+            power.append(target @ target)
+        return cls(np.array(gram), np.array(cross), np.array(power), np.diff(edges).astype(np.float64))
+
+    def solve(self, use: np.ndarray, prior: Prior, variance: float) -> Floats:
+        """Return the coefficients (p,) fitted on the blocks where `use` (B,) is true.
+
+        `variance` of a row's residual weighs the prior against the rows.
+        """
+        gram, cross = self.gram[use].sum(axis=0), self.cross[use].sum(axis=0)
+        scale = np.sqrt(np.diag(gram))
+        scale = np.where(scale > 0.0, scale, 1.0)
+        weight = prior.precision * variance
+        a = (gram + np.diag(weight)) / np.outer(scale, scale)
+        a += RIDGE * np.eye(scale.size)
+        b = (cross + weight * prior.mean) / scale
+        return np.asarray(bounded_minimum(a, b, prior.low * scale, prior.high * scale)) / scale
+
+    def errors(self, c: Floats, which: np.ndarray) -> Floats:
+        """Return the squared error of coefficients in each block of `which`."""
+        g, h = self.gram[which], self.cross[which]
+        found = self.power[which] - 2.0 * h @ c + np.einsum("i,kij,j->k", c, g, c)
+        return np.asarray(np.maximum(found, 1e-12 * self.power[which] + 1e-300))
+
+    def left_out(self, use: np.ndarray, prior: Prior, variance: float) -> tuple[Floats, Floats]:
+        """Return squared errors (B_use,) of each block of `use` predicted by the others, and coefficients.
+
+        The coefficients, (B_use, p), are those without each block.
+        """
+        members = np.flatnonzero(use)
+        errors, found = np.empty(members.size), []
+        for i, k in enumerate(members):
+            others = use.copy()
+            others[k] = False
+            c = self.solve(others, prior, variance)
+            errors[i] = self.errors(c, np.array([k]))[0]
+            found.append(c)
+        return errors, np.array(found)

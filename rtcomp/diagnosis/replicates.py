@@ -1,0 +1,107 @@
+"""The null distribution of the one test: replicates of a model through the same screening."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.candidates import candidates
+from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.fitted import Fitted
+from rtcomp.diagnosis.noise import Noise
+from rtcomp.diagnosis.replicate import replicate
+from rtcomp.diagnosis.screening import Screen
+from rtcomp.diagnosis.settings import REPLICATES
+from rtcomp.diagnosis.significance import Null
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats
+
+FEW = 6
+"""Replicates after which what is plain is settled."""
+
+
+def free_columns(fitted: Fitted) -> Floats:
+    """Return the columns (p, n) of a fit that are not at a bound, with its tangents."""
+    c, prior = fitted.coefficients, fitted.prior
+    slack = 1e-9 * np.abs(c)
+    free = (c > prior.low + slack) & (c < prior.high - slack)
+    return np.concatenate([fitted.system.columns[free], fitted.tangents])
+
+
+def null_of(fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: int) -> Null:
+    """Return the null distribution beside a fitted model.
+
+    Replicates are drawn until it is plain whether `gain` and the error of the fit are beyond them: sequential
+    Monte Carlo (Besag and Clifford 1991, Biometrika 78(2)). A model that cannot be kept on the recorded
+    motion is judged by surrogates of its residual instead.
+    """
+    balance = fitter.balance
+    try:
+        stage = fitter.stage(fitted, between=True)
+    except ConfigError:
+        return _surrogates(fitter, fitted, screen, seed)
+    motion = [p.x for p in balance.paths()]
+    recorded = balance.data.as_recorded()
+    noise = balance.noise.rms if balance.data.averaged == 1 else Noise.of(stage, recorded).rms
+    names = ent.names(fitted.entries)
+    events = any(ent.happens_once(ent.kind_of(c.term.entry)) for c in screen.candidates)
+
+    def one(number: int) -> tuple[float, float] | None:
+        data = replicate(stage, balance.data, motion, noise, 1000 * seed + number)
+        if data is None:
+            return None
+        other = fitter.on(data)
+        again = other.fit(list(fitted.terms), fitted, steps=0)
+        gains = screen.gains(free_columns(again), again.residual)
+        # Its own size is all that a single event has: the largest of these residuals, not of the recorded.
+        made = candidates(other, again, names, events=True) if events else []
+        if made:
+            gains += Screen(made, other.block, other.blocks, other.use).gains(
+                free_columns(again), again.residual
+            )
+        scale = fitter.power / max(other.power, 1e-300)
+        return max((s.gain for s in gains), default=0.0), float(again.errors.sum()) * scale
+
+    found: list[tuple[float, float]] = []
+    for first, last in ((0, FEW), (FEW, REPLICATES)):
+        found += [f for f in shared(one, range(first, last)) if f is not None]
+        if len(found) < FEW // 2:
+            return _surrogates(fitter, fitted, screen, seed)
+        null = Null(*np.array(found).T)
+        if null.plain(gain, float(fitted.errors.sum())):
+            break
+    return null
+
+
+def _surrogates(fitter: Fitter, fitted: Fitted, screen: Screen, seed: int) -> Null:
+    """Return the null distribution of residuals of the same spectrum that know nothing of the motion.
+
+    Phases are drawn anew (Theiler and others 1992, Physica D 58). The error that noise alone leaves is that
+    of the whitened residual: 1 a row.
+    """
+    random = np.random.default_rng(seed)
+    columns = free_columns(fitted)
+    size = np.abs(np.fft.rfft(fitted.residual))
+
+    def one(_: int) -> float:
+        turned = size * np.exp(2j * np.pi * random.random(size.size))
+        gains = screen.gains(columns, np.fft.irfft(turned, fitted.residual.size))
+        return max((s.gain for s in gains), default=0.0)
+
+    rows = float(np.count_nonzero(fitter.rows))
+    chance = random.normal(1.0, np.sqrt(2.0 / rows), FEW)
+    return Null(np.array([one(k) for k in range(FEW)]), rows * chance)
+
+
+def best(names: Sequence[str], gains: Sequence[float], count: int) -> list[int]:
+    """Return the numbers of the best `count` by gain, one of each name."""
+    found: list[int] = []
+    for i in np.argsort(-np.asarray(gains)).tolist():
+        if all(names[i] != names[j] for j in found):
+            found.append(i)
+        if len(found) == count:
+            break
+    return found

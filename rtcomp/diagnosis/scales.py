@@ -1,0 +1,162 @@
+"""What a recording offers to each unit: start values of the parameters of any effect.
+
+A length goes from the sensor's grain to the stroke, a speed over those of the motion, a voltage over those of
+the command, a time from a row to the length of the recording, a frequency to the motion's bandwidth; periods
+and tones of waves come from periodograms of the residual.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.fitted import Fitted
+from rtcomp.diagnosis.periodogram import highest, periodogram
+from rtcomp.diagnosis.where import as_white
+from rtcomp.kernels import Floats
+from rtcomp.physics import Effect, Parameter
+
+POINTS = 5
+"""Start values of a nonlinear parameter."""
+PEAKS = 3
+"""Peaks taken of a periodogram."""
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What a recording offers to each unit."""
+
+    length: tuple[float, float]
+    stroke: tuple[float, float]
+    speed: Floats
+    volts: Floats
+    time: tuple[float, float]
+    frequency: tuple[float, float]
+    force: float
+    periods: Floats
+    tones: Floats
+    moments: Floats
+
+    @classmethod
+    def of(cls, fitter: Fitter, fitted: Fitted) -> Scales:
+        """Measure them on the compared rows and on the residual of a fit."""
+        balance = fitter.balance
+        data, paths = balance.data, balance.paths()
+        v = np.abs(balance.plain([p.v for p in paths]))
+        u = np.abs(balance.plain([s.voltage for s in data.segments]))
+        low, high = data.stroke
+        # What cuts a command may show in the highest of it only.
+        quantiles = np.concatenate([np.linspace(0.1, 0.9, POINTS), 1.0 - np.geomspace(0.03, 0.001, 3)])
+        moving = v[v > 1e-3 * v.max()] if v.max() > 0 else v
+        slow, fast = (max(float(np.quantile(moving, q)), 1e-12) for q in (0.02, 0.9))
+        speed = np.geomspace(slow, fast, POINTS)
+        force = fitter.force(fitted) * ~balance.reserved[balance.block]
+        rest = as_white(balance, force)
+        return cls(
+            (max(2.0 * balance.grain, 1e-5 * (high - low)), 0.5 * (high - low)),
+            (low, high),
+            speed,
+            np.unique(np.quantile(u[u > 0], quantiles)) if np.any(u > 0) else np.ones(1),
+            (data.period, data.seconds),
+            (4.0 / data.seconds, min(0.4 * data.rate, balance.noise.bandwidth)),
+            float(np.sqrt(np.mean(force**2))),
+            _periods(balance, force, rest),
+            _tones(balance, rest),
+            _moments(balance, rest),
+        )
+
+    def of_parameter(self, p: Parameter, kind: type[Effect]) -> Sequence[float]:
+        """Return the start values of a nonlinear parameter, within its bounds."""
+        found = self._of_parameter(p, kind)
+        return [float(x) for x in found if p.lowest <= x <= p.high and not (p.open_low and x == p.low)]
+
+    def _of_parameter(self, p: Parameter, kind: type[Effect]) -> list[float]:
+        waves = any(q.unit == ent.PHASE for q in kind.parameters)
+        if p.name in kind.search_grid:
+            return list(kind.search_grid[p.name])
+        if p.choice:
+            return [p.low, p.high]
+        if p.name == ent.PERIOD:
+            return _listed(self.periods)
+        if p.name == ent.MOMENT:
+            return _listed(self.moments)
+        if p.unit == "Hz" and waves:
+            return _listed(self.tones)
+        if p.unit == "m" and p.low < 0.0:
+            return _listed(np.linspace(*self.stroke, 2 * POINTS + 3)[1:-1])
+        found = self._of_unit(p.unit.removeprefix("1/"))
+        if found is not None:
+            return [1.0 / value for value in found] if p.unit.startswith("1/") else found
+        return [float(kind.example.get(p.name, 1.0))]
+
+    def _of_unit(self, unit: str) -> list[float] | None:
+        """Return the values that a unit takes on this recording, None of a unit without scale."""
+        found = {
+            "m": np.geomspace(*self.length, POINTS + 1),
+            "m/s": self.speed,
+            "V": self.volts,
+            "N": self.force * np.array([0.3, 1.0, 3.0]),
+            "s": np.geomspace(*self.time, POINTS + 2)[1:],
+            "Hz": np.geomspace(*self.frequency, 2 * POINTS),
+        }.get(unit)
+        return None if found is None else _listed(found)
+
+
+def _listed(values: Floats) -> list[float]:
+    return [float(value) for value in values]
+
+
+def _periods(balance: ForceBalance, force: Floats, residual: Floats) -> Floats:
+    """Return periods (m) of waves along the position, in the residual as force and as displacement."""
+    paths = balance.paths()
+    x = balance.plain([p.x for p in paths])
+    v = balance.plain([p.v for p in paths])
+    u = balance.plain([s.voltage for s in balance.data.segments])
+    span = float(np.ptp(x))
+    step = float(np.median(np.abs(np.diff(x)))) or span / 1000.0
+    most = float(np.clip(span / max(2.0 * step, 4.0 * balance.grain, 1e-4 * span), 4.0, 1500.0))
+    found: list[float] = []
+    for weight, of in (
+        (np.ones_like(x), force),
+        (np.sign(v), force),
+        (u, force),
+        (np.ones_like(x), residual),
+    ):
+        n, power = periodogram(x, span, weight, of, most)
+        some = n >= 0.8
+        found += [span / k for k in highest(n[some], power[some], PEAKS, 0.05)]
+    periods = np.sort(np.array(found))
+    return np.asarray(periods[np.concatenate([[True], np.diff(np.log(periods)) > 0.02])])
+
+
+def _tones(balance: ForceBalance, residual: Floats) -> Floats:
+    """Return frequencies (Hz) of the strongest lines of the residual in time."""
+    rate = balance.data.rate / balance.whitening.thinning
+    size = residual.size
+    power = np.abs(np.fft.rfft(residual * np.hanning(size), 4 * size)) ** 2
+    frequency = np.asarray(np.arange(power.size) * (rate / (4 * size)), dtype=np.float64)
+    some = (frequency > 3.0 * rate / size) & (frequency < 0.45 * rate)
+    lines: list[float] = highest(frequency[some], np.asarray(power[some], dtype=np.float64), PEAKS + 2, 0.01)
+    return np.sort(np.array(lines))
+
+
+def _moments(balance: ForceBalance, residual: Floats) -> Floats:
+    """Return times (s) at which the reading steps, and those of the largest residuals, apart from each other.
+
+    A step stands between two rows of the recording, a residual within what the filter remembers of it.
+    """
+    time = balance.plain([s.time for s in balance.data.segments])
+    stepped = [at for at, _ in balance.data.jumps]
+    left, found = np.abs(residual), []
+    apart = max(10, residual.size // 500)
+    for _ in range(PEAKS):
+        at = int(np.argmax(left))
+        found.append(float(time[at]))
+        left = left.copy()
+        left[max(at - apart, 0) : at + apart + 1] = 0.0
+    return np.sort([*stepped, *found])

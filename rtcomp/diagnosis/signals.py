@@ -1,0 +1,343 @@
+"""Signals along the recordings: drive side, and what the motion needs of mass, friction and each effect.
+
+Unfiltered, one array a segment. Entries that add a force are columns of free size; those that change
+friction, drive, sensor or mass are at work while the other columns are made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.bank import SPEED_UNITS, deflections, units_along
+from rtcomp.diagnosis.cache import Cache, Group
+from rtcomp.diagnosis.data import Data, Segment, behind_reading
+from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.noise import Noise
+from rtcomp.diagnosis.play import Load, behind_play
+from rtcomp.diagnosis.reaches import grid
+from rtcomp.diagnosis.spectrum import filtered
+from rtcomp.kernels import Floats
+from rtcomp.physics import Effect, Place, catalogue
+from rtcomp.physics.maxwell_slip import MaxwellSlip
+from rtcomp.stage.balance import around_rows, forces, parts_of_drive
+from rtcomp.stage.stage import Stage
+
+BASE = ("mass", "viscous", "micro_damping")
+"""Numbers whose columns come first. After them that of the speed of micro-damping, to first order, then
+those of the friction units, and a constant force."""
+FASTER = 0.02
+"""Relative change of the speed of micro-damping to which its damping is looked at."""
+FURTHEST = 0.3
+"""Largest change of its logarithm that is taken from one fit."""
+PARTS = 2
+"""Parts of a row for friction: where it turns within one, the force at its ends is not that between."""
+MORE = 1e-3
+"""Relative change of the command to which that of friction is looked at."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """The motion behind a segment, all (K,): true position smoothed (m), velocity, acceleration of both."""
+
+    x: Floats
+    v: Floats
+    a: Floats
+    measured: Floats
+    """Acceleration (m/s^2) of the position as measured, as the balance compares it."""
+
+    def part(self, rows: slice) -> Path:
+        """Return some of its rows."""
+        return Path(self.x[rows], self.v[rows], self.a[rows], self.measured[rows])
+
+
+class Signals:
+    """What one stage makes of one set of recordings, row by row."""
+
+    def __init__(self, stage: Stage, data: Data, noise: Noise | None = None) -> None:
+        self.stage, self.data = stage, data
+        self.noise = noise or Noise.of(stage, data)
+        share = min(1.0, self.noise.bandwidth / (0.5 * data.rate))
+        self.grain = 1.5 * self.noise.rms * float(np.sqrt(share))
+        self.coarse = grid(stage, data, self.grain)
+        """Yield displacements (m) over all that the recording could show."""
+        self.reaches = self.coarse
+        self.step = float(np.log(self.reaches[1] / self.reaches[0]))
+        """Between yield displacements (logarithm)."""
+        believed = [dict(e) for e in stage.mechanics.effects]
+        self.believed = [e for e in believed if _refitted(e)]
+        """Entries of the belief that add a force: their sizes are refitted with the base."""
+        self._fixed = [ent.build(e) for e in believed if not _refitted(e)]
+        friction = stage.friction
+        self._elements = list(friction.elements) if isinstance(friction, MaxwellSlip) else []
+        self._cache = Cache()
+        m = stage.mechanics
+        self.believed_speed = m.micro_damping_speed if m.micro_damping > 0.0 else None
+        """Speed (m/s) below which micro-damping is believed to act, None where there is no such belief."""
+
+    @property
+    def believed_reaches(self) -> Floats:
+        """Yield displacements (m) that the belief states."""
+        return np.unique([r for _, r in self._elements])
+
+    @property
+    def size(self) -> int:
+        """Columns of the base: mass, damping and its speed, friction units, and last a constant force."""
+        return len(BASE) + 1 + self.reaches.size + 1
+
+    @property
+    def friction(self) -> slice:
+        """Columns of the friction units, in the order of `reaches`."""
+        return slice(len(BASE) + 1, len(BASE) + 1 + self.reaches.size)
+
+    @property
+    def biased(self) -> bool:
+        """Tell whether the belief has a constant force, which is refitted."""
+        return any(ent.kind_of(e).bias for e in self.believed)
+
+    @property
+    def faster(self) -> int:
+        """Column of the speed of micro-damping: its coefficient is damping times the change of log speed."""
+        return len(BASE)
+
+    def speed_of(self, c: Floats) -> float:
+        """Return the speed (m/s) of micro-damping that coefficients `c` of the base tell."""
+        now, damping = self.stage.mechanics.micro_damping_speed, float(c[self.faster - 1])
+        if damping <= 0.0 or self.believed_speed is None:
+            return now
+        change = float(np.clip(c[self.faster] / damping, -FURTHEST, FURTHEST))
+        return now * float(np.exp(change))
+
+    def without(self, number: str) -> bool:
+        """Tell whether the belief denies a number of the base: it has friction, but none of this kind.
+
+        Then an effect that stands for it may be missing; a belief without friction leaves it open.
+        """
+        stated = float(getattr(self.stage.mechanics, number))
+        named = any(k.stands_for == number and k.searchable for k in catalogue.entries())
+        return stated == 0.0 and self.stage.friction is not None and named
+
+    def damp_below(self, speed: float) -> None:
+        """Take `speed` (m/s) as that below which micro-damping acts."""
+        self.stage = self.stage.with_changes(stage={"micro_damping_speed": speed})
+
+    def _force_of(self, effect: Effect, segment: Segment, path: Path) -> Floats:
+        """Return the force (N, (K,)) that the motion needs for an effect that adds one."""
+        given = self._given(segment)
+        f = forces(self.stage, [effect], segment.time, path.x, path.v, path.a, given, self.grain)
+        return np.asarray(-f.others() - around_rows(f.drive))
+
+    def paths(self, sensors: Sequence[Effect] = ()) -> list[Path]:
+        """Return the motion of every segment, what `sensors` did to the reading undone."""
+        return self._cache.of(
+            ("paths", key_of(sensors)), lambda: [self._path(s, sensors) for s in self.data.segments]
+        )
+
+    def _path(self, segment: Segment, sensors: Sequence[Effect], *, smooth: bool = True) -> Path:
+        rate = self.data.rate
+        x = behind_reading(segment, sensors)
+        slow = filtered(x, rate, self.noise.wiener) if smooth else x
+        if self.data.held:
+            measured = _second_difference(x, rate)
+            v = filtered(x, rate, self.noise.wiener, derivative=True)
+        else:
+            v = filtered(x, rate, _all, derivative=True)
+            measured = around_rows(filtered(v, rate, _all, derivative=True))
+            v = filtered(v, rate, self.noise.wiener)
+        return Path(slow, v, _second_difference(slow, rate), measured)
+
+    def _given(self, segment: Segment) -> Floats:
+        """Return the command (V, (K,)) that acts up to each row."""
+        u = segment.voltage
+        return np.append(u[:1], u[:-1]) if self.data.held else u
+
+    def _drive_side(self, drive: Sequence[Effect], sensors: Sequence[Effect]) -> list[Floats]:
+        own = [e for e in self.stage.chain if e.place is Place.DRIVE and e.name not in {b["name"] for b in
+               self.stage.mechanics.effects}]  # fmt: skip
+        chain = sorted([*own, *drive], key=lambda e: e.order)
+        found = []
+        for s, p in zip(self.data.segments, self.paths(sensors), strict=True):
+            parts = parts_of_drive(chain) if self.data.held else 1
+            f = forces(self.stage, chain, s.time, p.x, p.v, p.a, self._given(s), parts=parts)
+            mean = 0.5 * (f.drive + np.append(f.drive[1:], f.drive[-1:]))
+            found.append((mean if self.data.held else around_rows(f.drive)) + around_rows(f.push))
+        return found
+
+    def _base(
+        self,
+        drive: Sequence[Effect],
+        sensors: Sequence[Effect],
+        modifiers: Sequence[Effect],
+        bodies: Sequence[Effect],
+        adding: Sequence[Effect],
+        weights: Floats | None,
+    ) -> tuple[list[Group], Group | None]:
+        """Return the base's columns (mass; damping; its speed; friction units; a constant force), the load's.
+
+        The last is how much the friction at hand changes with the command, relative to it.
+        """
+        whole = any(e.whole_friction for e in modifiers)
+        play = next((e for e in bodies if e.behind and _active(e)), None)
+        hung = [e for e in bodies if not e.behind]
+        own = weights.tobytes() if weights is not None and (whole or play is not None) else b""
+        before: list[Effect] = []
+        if any(e.values.get("external") is not None for e in modifiers):
+            chain = [e for e in self.stage.chain if e.place is Place.DRIVE]
+            before = [*chain, *[e for e in drive if e not in chain]]
+            if any(e.values.get("external") for e in modifiers):
+                before += [e for e in adding if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
+        behind = ("load", key_of([play] if play else []), own if play is not None else b"")
+
+        def mass() -> list[Floats]:
+            found = []
+            for k, (s, p) in enumerate(zip(self.data.segments, self.paths(sensors), strict=True)):
+                a = p.measured
+                if hung:
+                    f = forces(
+                        self.stage, sorted(hung, key=lambda e: e.order), s.time, p.x, p.v, p.a, s.voltage
+                    )
+                    a = (a * f.mass - around_rows(f.push)) / self.stage.mass
+                if play is not None:
+                    rest = _second_difference(self._load(sensors, play, weights)[k], self.data.rate)
+                    a = a + play.values["share"] * (rest - p.a)
+                found.append(a)
+            return found
+
+        def units(
+            more: float = 0.0, some: np.ndarray | None = None, stage: Stage = self.stage
+        ) -> list[Floats]:
+            found = []
+            for k, (s, p) in enumerate(zip(self.data.segments, self.paths(sensors), strict=True)):
+                path = p
+                if play is not None:
+                    y = self._load(sensors, play, weights)[k]
+                    v = np.gradient(y, self.data.period)
+                    path = Path(y, v, _second_difference(y, self.data.rate), p.measured)
+                pushed = replace(s, voltage=(1.0 + more) * s.voltage) if more else s
+                at_hand = weights if whole else None
+                found.append(self._units(stage, pushed, path, before, modifiers, at_hand, some))
+            return found
+
+        def damping() -> list[Floats]:
+            present = held != 0.0 if whole else np.zeros(held.size, dtype=np.bool_)
+            pairs = zip(units(some=present), units(some=present, stage=self._damping_below()), strict=True)
+            last = SPEED_UNITS - 1
+            return [
+                np.column_stack([now[:, :SPEED_UNITS], (then[:, last] - now[:, last]) / np.log1p(FASTER)])
+                for now, then in pairs
+            ]
+
+        def friction(more: float = 0.0) -> list[Floats]:
+            return [table[:, SPEED_UNITS:] for table in units(more)]
+
+        def of_sizes(sizes: Floats) -> list[Floats]:
+            some = sizes != 0.0
+            if whole:
+                some |= held != 0.0
+            return [table[:, SPEED_UNITS:] @ sizes[some] for table in units(some=some)]
+
+        def by_load() -> list[Floats]:
+            pairs = zip(friction(MORE), friction(), strict=True)
+            return [(more - plain) @ held / MORE for more, plain in pairs]
+
+        held = self.weights if weights is None else weights
+        key = (key_of(before), key_of(modifiers), key_of(sensors), behind, own)
+        columns = [
+            Group(("mass", key_of(hung), key_of(sensors), behind), mass),
+            Group(("damping", self.stage.mechanics.micro_damping_speed, *key), damping),
+            Group(("friction", *key), friction, of_sizes, self.reaches.size),
+            Group(("offset",), lambda: [np.ones(s.time.size) for s in self.data.segments]),
+        ]
+        return columns, Group(("by load", held.tobytes(), *key), by_load) if before else None
+
+    def _load(self, sensors: Sequence[Effect], play: Effect, weights: Floats | None) -> list[Floats]:
+        """Return the position (m) of the load behind a play along each segment."""
+        held = self.weights if weights is None else weights
+        m = self.stage.mechanics
+        share, gap, contact = (play.values[k] for k in ("share", "gap", "contact"))
+        load = Load(share * m.mass, m.viscous, m.micro_damping, m.micro_damping_speed, held, self.reaches)
+        key = ("behind", key_of(sensors), key_of([play]), held.tobytes())
+        return self._cache.of(
+            key, lambda: [behind_play(p.x, self.data.period, gap, contact, load) for p in self.paths(sensors)]
+        )
+
+    @property
+    def weights(self) -> Floats:
+        """Believed friction as stiffnesses (N/m) of the units."""
+        found = np.zeros(self.reaches.size)
+        for k, r in self._elements:
+            at = int(np.argmin(np.abs(np.log(self.reaches / r))))
+            found[at] += k * r / self.reaches[at]
+        return found
+
+    def _damping_below(self) -> Stage:
+        speed = (1.0 + FASTER) * self.stage.mechanics.micro_damping_speed
+        return self.stage.with_changes(stage={"micro_damping_speed": speed})
+
+    def _units(
+        self,
+        stage: Stage,
+        segment: Segment,
+        path: Path,
+        before: Sequence[Effect],
+        modifiers: Sequence[Effect],
+        weights: Floats | None,
+        some: np.ndarray | None = None,
+    ) -> Floats:
+        """Return the force (N, (K, p)) around the rows of damping and of friction units, all or `some`."""
+        motion = np.column_stack([segment.time, path.x, path.v, path.a, self._given(segment)])
+        held, reaches = self.weights if weights is None else weights, self.reaches
+        start = self._start(segment)
+        if some is not None:
+            held, reaches, start = held[some], reaches[some], start[some]
+        return units_along(
+            stage, list(before), list(modifiers), reaches, held, np.ascontiguousarray(motion),
+            self.grain, start, PARTS,
+        )  # fmt: skip
+
+    def _start(self, segment: Segment) -> Floats:
+        """Return the deflections (m) of the friction units at the first row of a segment."""
+        if segment.before is None:
+            return np.zeros(self.reaches.size)
+        way, key = segment.before, ("start", float(segment.time[0]), segment.time.size)
+        found: Floats = self._cache.of(key, lambda: [deflections(way, self.reaches)])[0]
+        return found
+
+    def _added(self, entry: Entry, sensors: Sequence[Effect]) -> Group:
+        """Return the force that the motion needs for an entry that adds one."""
+        effect = ent.build(entry)
+
+        def made() -> list[Floats]:
+            pairs = zip(self.data.segments, self.paths(sensors), strict=True)
+            return [self._force_of(effect, s, p) for s, p in pairs]
+
+        return Group(("added", key_of([effect]), key_of(sensors)), made)
+
+
+def _active(effect: Effect) -> bool:
+    """Tell whether an effect is away from the values at which it changes nothing."""
+    neutral = effect.neutral or {}
+    return not neutral or any(effect.values[name] != value for name, value in neutral.items())
+
+
+def _refitted(entry: Entry) -> bool:
+    kind = ent.kind_of(entry)
+    return ent.adds_force(kind) and bool(kind.linear)
+
+
+def _second_difference(x: Floats, rate: float) -> Floats:
+    a = np.zeros_like(x)
+    a[1:-1] = (x[2:] - 2.0 * x[1:-1] + x[:-2]) * rate**2
+    return a
+
+
+def _all(frequency: Floats) -> Floats:
+    return np.ones_like(frequency)
+
+
+def key_of(effects: Sequence[Effect]) -> Hashable:
+    """Return what tells effects with their values from others, whatever their order."""
+    return tuple(sorted(repr(e.to_dict()) for e in effects))

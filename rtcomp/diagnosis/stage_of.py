@@ -1,0 +1,118 @@
+"""From a fitted model to a stage in the belief's own format."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.balance import BASE, ForceBalance
+from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.fitted import Fitted
+from rtcomp.kernels import Floats
+from rtcomp.physics import catalogue
+from rtcomp.stage.stage import Stage
+
+SLIGHT = 1e-6
+"""Part of the largest yield force below which a friction unit is left out."""
+
+
+def stage_of(balance: ForceBalance, fitted: Fitted, *, between: bool = False) -> Stage:
+    """Return the believed stage with the fit's numbers, and the fit's entries among its effects.
+
+    `between` shares out friction that is not believed to places between those of the grid: as the recording's
+    own friction, it is then not quite within reach of a fit on the grid.
+    """
+    c = fitted.coefficients
+    data = balance.stage.to_dict()
+    mechanics: dict[str, Any] = data["stage"]
+    for key, value in zip(BASE, c, strict=False):
+        mechanics[key] = float(max(value, 0.0))
+    mechanics["micro_damping_speed"] = balance.speed_of(c)
+    stiffness, reaches = c[balance.friction], balance.reaches
+    if between:
+        stiffness, reaches = _between(balance, stiffness)
+    level = stiffness * reaches
+    force = float(np.sqrt(np.mean(np.concatenate([s.voltage for s in balance.data.segments]) ** 2)))
+    least = SLIGHT * max(float(level.max()), force * balance.stage.force_constant)
+    units = [
+        {"stiffness": float(k), "reach": float(r)}
+        for k, r, f in zip(stiffness, reaches, level, strict=True)
+        if f > least
+    ]
+    mechanics.pop("friction", None)
+    if units:
+        mechanics["friction"] = units
+    believed: list[Entry] = []
+    at = iter(fitted.system.of_entry)
+    refitted = {id(e): next(at) for e in balance.believed}
+    by_content = {repr(e): refitted[id(e)] for e in balance.believed}
+    for entry in mechanics.get("effects", []):
+        span = by_content.get(repr(dict(entry)))
+        believed.append(dict(entry) if span is None else ent.composed(entry, c[span]))
+    offset = float(c[balance.size - 1])
+    constant: list[Entry] = [bias_entry(-offset)] if offset != 0.0 else []
+    effects = merged([*believed, *constant, *fitted.entries])
+    mechanics["effects"] = effects
+    if not effects:
+        del mechanics["effects"]
+    return Stage.from_dict(data)
+
+
+def with_forces(stage: Stage, factor: float) -> Stage:
+    """Return a stage that moves as `stage` does, all its forces and the drive's times `factor`."""
+    m = stage.mechanics
+    changes: dict[str, Any] = {
+        key: factor * getattr(m, key) for key in ("mass", "force_constant", "viscous", "micro_damping")
+    }
+    if isinstance(m.friction, list):
+        changes["friction"] = [{"stiffness": factor * e.stiffness, "reach": e.reach} for e in m.friction]
+    changed = stage.with_changes(stage=changes).to_dict()
+    effects = [dict(e) for e in changed["stage"].get("effects", [])]
+    if effects:
+        changed["stage"]["effects"] = [
+            ent.composed(e, factor * ent.sizes_of(e)) if ent.adds_force(ent.kind_of(e)) else e
+            for e in effects
+        ]
+    return Stage.from_dict(changed)
+
+
+def bias_entry(force: float) -> Entry:
+    """Return the catalogue's plainest constant force (N)."""
+    kinds = [k for k in catalogue.entries() if k.bias and ent.adds_force(k)]
+    kind = min(kinds, key=lambda k: len(k.parameters))
+    return {"name": kind.name, kind.linear[0]: force}
+
+
+def _between(balance: ForceBalance, stiffness: Floats) -> tuple[Floats, Floats]:
+    """Return stiffnesses (N/m) and reaches (m) of units halfway between those of the grid, same forces."""
+    reaches = balance.reaches
+    grid = ~np.isin(reaches, balance.believed_reaches)
+    away = np.exp(0.5 * balance.step)
+    below, above = reaches[grid] / away, reaches[grid] * away
+    half = 0.5 * stiffness[grid] * reaches[grid]
+    made = np.concatenate([reaches[~grid], below, above])
+    stiff = np.concatenate([stiffness[~grid], half / below, half / above])
+    order = np.argsort(made)
+    return stiff[order], made[order]
+
+
+def merged(effects: Sequence[Entry]) -> list[Entry]:
+    """Return effects, those of one name that differ in linear parameters only added up."""
+    found: list[Entry] = []
+    for entry in effects:
+        kind = ent.kind_of(entry)
+        plain = ent.adds_force(kind) and bool(kind.linear) and set(entry) <= {"name", *kind.linear}
+        same = next(
+            (e for e in found if plain and e["name"] == entry["name"] and set(e) <= {"name", *kind.linear}),
+            None,
+        )
+        if same is None:
+            found.append(dict(entry))
+            continue
+        for name in kind.linear:
+            if name in entry or name in same:
+                same[name] = float(same.get(name, 0.0)) + float(entry.get(name, 0.0))
+    return found

@@ -1,0 +1,422 @@
+"""The trajectory objective: position simulated over short windows, all numbers of the stage moved at once.
+
+For axes that mostly stick finer than their sensor sees, where the force balance cannot judge. Numbers of the
+belief are moved by their logarithm, friction by its level and its reach; residuals are errors of position of
+which far ones count less. Blocks are left out on the problem linearised where the fit ended.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.balance import BASE, ForceBalance, System
+from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.data import Data
+from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.fit import STEPS, Fitter
+from rtcomp.diagnosis.fitted import Fitted, left_out
+from rtcomp.diagnosis.free import Free, Term, all_free_of
+from rtcomp.diagnosis.regression import Grams, Prior
+from rtcomp.diagnosis.replicate import replicate
+from rtcomp.diagnosis.result import PositionFit
+from rtcomp.diagnosis.retuned import level_and_reach
+from rtcomp.diagnosis.settings import BELIEF_SD
+from rtcomp.diagnosis.stage_of import merged
+from rtcomp.diagnosis.windows import GROUPS, Windows
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats
+from rtcomp.physics import Effect, Place
+from rtcomp.stage.stage import Stage
+
+LEVEL, REACH = "level", "reach"
+FAR = 4.0
+"""Logarithm of the largest factor that friction is moved by, and sizes in those of the believed ones."""
+STEP = 5e-3
+"""With which derivatives along the numbers of the belief are taken."""
+RELEASED = 0.3
+"""Part of friction's level that a fit starts from too: the rest may have been what the effect makes."""
+TIMES = (0.1, 0.3, 3.0, 10.0)
+"""Times the size that first order has, at which an effect is tried too."""
+FEW = 3
+"""Steps after which the starts of a fit are compared."""
+SETTLED = 3e-4
+"""Relative gain of a step below which a fit ends."""
+TRIES = 4
+"""Dampings tried for one step."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number of the belief: its name, or the place of a believed entry's size; what it is moved by."""
+
+    name: str
+    scale: float
+    """What 1 stands for: a factor of e where it is positive (0), else so much more."""
+    near: bool
+    """Whether the belief holds it near its value."""
+    at: int = 0
+
+
+class Trajectory(Fitter):
+    """Fits models to where the axis went."""
+
+    gridded = False
+
+    def __init__(self, balance: ForceBalance, stage: Stage, windows: Windows, scale: float) -> None:
+        super().__init__(balance)
+        self.believed, self.windows, self.scale = stage, windows, scale
+        """The stage whose numbers are moved; where it is let go; error (m) beyond which one counts less."""
+        self._rows = windows.rows
+        self._own = [dict(e) for e in stage.mechanics.effects if _sized(dict(e))]
+        self.numbers_moved = self._numbers()
+        moved = windows.moved()[windows.block < GROUPS]
+        self._power = float(np.sum((moved / scale) ** 2))
+
+    @classmethod
+    def of(cls, balance: ForceBalance, stage: Stage) -> Trajectory:
+        """Take the usual error of `stage` as what is far."""
+        windows = Windows.of(balance)
+        off = np.abs(windows.off(stage)[windows.block < GROUPS])
+        return cls(balance, stage, windows, max(float(np.median(off)), balance.noise.rms, 1e-300))
+
+    # -- what an objective is -----------------------------------------------------------------------------
+
+    @property
+    def block(self) -> np.ndarray:
+        """See `Fitter`."""
+        return np.repeat(self.windows.block, self._rows)
+
+    @property
+    def blocks(self) -> int:
+        """See `Fitter`: groups, and the reserved windows."""
+        return GROUPS + 1
+
+    @property
+    def use(self) -> np.ndarray:
+        """See `Fitter`."""
+        return np.arange(GROUPS + 1) < GROUPS
+
+    @property
+    def power(self) -> float:
+        """See `Fitter`: squared travel within the windows."""
+        return self._power
+
+    def linear(self, kind: type[Effect]) -> bool:
+        """See `Fitter`: nothing is linear here."""
+        return False
+
+    def judges(self, kind: type[Effect]) -> bool:
+        """See `Fitter`: what a sensor does is no motion, and in so short a window no more than one."""
+        return kind.place is not Place.SENSOR
+
+    def rough(self, model: Fitted, terms: Sequence[Term], count: int, ends: float) -> list[Term]:
+        """See `Fitter`: first order is no guide to what sticks, so each is fitted for a few steps."""
+
+        def sized(term: Term) -> tuple[float, Term]:
+            found = [(self._left(model, one), one) for one in self._sizes_of(term)]
+            return min(found, key=lambda pair: pair[0])
+
+        def tried(term: Term) -> tuple[float, Term]:
+            if time.monotonic() > ends:
+                return math.inf, term
+            try:
+                _, moved, left = self._moved(model.coefficients, [*model.terms, term], FEW, entries=True)
+            except (ConfigError, np.linalg.LinAlgError):
+                return math.inf, term
+            return left, moved[-1]
+
+        best = _first(shared(sized, terms), 3 * count)
+        return _first(shared(tried, best), count)
+
+    def _left(self, model: Fitted, term: Term) -> float:
+        try:
+            rest = self.residual(model.coefficients, [*model.terms, term])
+        except ConfigError:
+            return math.inf
+        return float(np.sum(rest[self.rows] ** 2))
+
+    def _sizes_of(self, term: Term) -> list[Term]:
+        """Return a term at its own and at smaller and larger sizes."""
+        kind = ent.kind_of(term.entry)
+        found = [term]
+        for times in TIMES:
+            entry = dict(term.entry)
+            for p in kind.parameters:
+                if p.name in kind.linear and p.name in entry:
+                    neutral = ent.neutral(kind, p.name)
+                    value = neutral + times * (float(entry[p.name]) - neutral)
+                    entry[p.name] = min(max(value, 0.9 * p.lowest), 0.9 * p.high)
+            found.append(term.with_entry(entry))
+        return found
+
+    def units(self, entries: Sequence[Entry]) -> Floats:
+        """See `Fitter`; raises NotImplementedError: nothing is linear."""
+        raise NotImplementedError("a trajectory has no columns of unit size")
+
+    def change(self, model: Fitted, entry: Entry) -> Floats:
+        """See `Fitter`."""
+        other = self.residual(model.coefficients, [*model.terms, Term(entry, frozenset())])
+        return model.residual - other
+
+    def stage(self, model: Fitted, *, between: bool = False) -> Stage:
+        """See `Fitter`."""
+        return self._stage(model.coefficients, model.terms)
+
+    def force(self, model: Fitted) -> Floats:
+        """See `Fitter`."""
+        return self._open(self.stage(model))
+
+    def without(self, model: Fitted, at: int) -> Floats:
+        """See `Fitter`."""
+        return self._open(self._stage(model.coefficients, [*model.terms[:at], *model.terms[at + 1 :]]))
+
+    def _open(self, stage: Stage) -> Floats:
+        drive, needed = self.balance.both_sides(stage)
+        return np.asarray(drive - needed)
+
+    def relative(self, model: Fitted) -> float:
+        """See `Fitter`: error over travel."""
+        return self._relative(model.residual)
+
+    def relative_of(self, stage: Stage) -> float:
+        """See `Fitter`."""
+        return self._relative(self._bent(self.windows.off(stage)))
+
+    def _relative(self, residual: Floats) -> float:
+        return float(np.sqrt(np.sum(residual[self.rows] ** 2) / max(self._power, 1e-300)))
+
+    def above_noise(self, model: Fitted) -> float:
+        """See `Fitter`: a reading and that at the window's begin are both noisy."""
+        noise = 2.0 * (self.balance.noise.rms / self.scale) ** 2 * np.count_nonzero(self.rows)
+        return float(np.sqrt(max(self.relative(model) ** 2 - noise / max(self._power, 1e-300), 0.0)))
+
+    def has_offset(self, model: Fitted) -> bool:
+        """See `Fitter`: none beside the entries."""
+        return False
+
+    def on(self, data: Data) -> Trajectory:
+        """See `Fitter`."""
+        balance = self.balance.on(data)
+        return Trajectory(balance, self.believed, self.windows.on(balance), self.scale)
+
+    def position(self, before: Stage, retuned: Stage, after: Stage, seed: int) -> PositionFit | None:
+        """See `Fitter`: mean absolute errors (m) over windows that lie in reserved blocks."""
+        which = self.windows.block == GROUPS
+        motion, noise = [p.x for p in self.balance.paths()], self.balance.noise.rms
+        data = replicate(after, self.balance.data, motion, noise, seed)
+
+        def error(windows: Windows, stage: Stage) -> float:
+            return float(np.mean(np.abs(windows.off(stage)[which])))
+
+        floor = error(self.on(data).windows, after) if data is not None else noise
+        found = [error(self.windows, stage) for stage in (before, retuned, after)]
+        return PositionFit(found[0], found[1], found[2], floor, self.windows.seconds)
+
+    def quick(self, terms: Sequence[Term]) -> float:
+        """See `Fitter`."""
+        return float(np.sum(self.residual(np.zeros(len(self.numbers_moved)), terms)[self.rows] ** 2))
+
+    # -- numbers and stage --------------------------------------------------------------------------------
+
+    def _numbers(self) -> list[Number]:
+        m = self.believed.mechanics
+        found = [Number(n, 0.0, near=True) for n in BASE if float(getattr(m, n)) > 0.0]
+        if isinstance(m.friction, list):
+            found += [Number(LEVEL, 0.0, near=False), Number(REACH, 0.0, near=False)]
+        volts = np.concatenate([s.voltage for s in self.balance.data.segments])
+        force = self.believed.force_constant * float(np.sqrt(np.mean(volts**2)))
+        for i, size in enumerate(self._sizes()):
+            found.append(Number("size", abs(size) or 0.1 * force, near=size != 0.0, at=i))
+        return found
+
+    def _sizes(self) -> Floats:
+        return np.concatenate([np.zeros(0), *(ent.sizes_of(e) for e in self._own)])
+
+    def _stage(self, c: Floats, terms: Sequence[Term]) -> Stage:
+        """Return the stage of numbers `c` and of `terms`; raise ConfigError where one is out of range."""
+        data = self.believed.to_dict()
+        m: dict[str, Any] = data["stage"]
+        sizes, level, reach = self._sizes(), 1.0, 1.0
+        for number, value in zip(self.numbers_moved, c.tolist(), strict=True):
+            if number.name == LEVEL:
+                level = math.exp(value)
+            elif number.name == REACH:
+                reach = math.exp(value)
+            elif number.scale == 0.0:
+                m[number.name] *= math.exp(value)
+            else:
+                sizes[number.at] += value * number.scale
+        if isinstance(m.get("friction"), list):
+            m["friction"] = [
+                {"stiffness": e["stiffness"] * level / reach, "reach": e["reach"] * reach}
+                for e in m["friction"]
+            ]
+        at, effects = 0, []
+        for entry in m.get("effects", []):
+            mine = dict(entry)
+            if _sized(mine):
+                count = ent.sizes_of(entry).size
+                mine, at = ent.composed(mine, sizes[at : at + count]), at + count
+            effects.append(mine)
+        effects = merged([*effects, *(t.entry for t in terms)])
+        m["effects"] = effects
+        if not effects:
+            del m["effects"]
+        return Stage.from_dict(data)
+
+    def numbers(self, model: Fitted, *, effects: bool) -> tuple[Floats, Floats, Floats]:
+        """See `Fitter`."""
+        sizes = self._sizes() if effects else np.zeros(0)
+        sign = np.where(sizes < 0.0, -1.0, 1.0)
+
+        def of(c: Floats) -> Floats:
+            stage = self._stage(c[: len(self.numbers_moved)], [])
+            m = stage.mechanics
+            friction = m.friction if isinstance(m.friction, list) else []
+            held = level_and_reach([(e.stiffness, e.reach) for e in friction]) if friction else (0.0, 0.0)
+            believed = [ent.sizes_of(dict(e)) for e in m.effects if _sized(e)] if effects else []
+            own = np.concatenate([np.zeros(0), *believed])[: sizes.size]
+            return np.array([*(float(getattr(m, n)) for n in BASE), *held, *(sign * own)])
+
+        return of(model.coefficients), np.array([of(c) for c in model.without]), sizes
+
+    # -- residuals and fits -------------------------------------------------------------------------------
+
+    def _bent(self, off: Floats) -> Floats:
+        """Return errors (m) over the scale, far ones bent: squares near, straight lines far; (n,)."""
+        e = off.ravel() / self.scale
+        return np.asarray(np.sign(e) * np.sqrt(2.0 * (np.sqrt(1.0 + e**2) - 1.0)))
+
+    def residual(self, c: Floats, terms: Sequence[Term]) -> Floats:
+        """Return the residual (n,) of numbers `c` (p,) and `terms`; raise ConfigError where out of range."""
+        return self._bent(self.windows.off(self._stage(c, terms)))
+
+    def _prior(self) -> Prior:
+        size = len(self.numbers_moved)
+        near = np.array([n.near for n in self.numbers_moved], dtype=np.float64)
+        return Prior(np.zeros(size), near / BELIEF_SD**2, np.full(size, -FAR), np.full(size, FAR))
+
+    def fit(self, terms: Sequence[Term], start: Fitted | None = None, steps: int = STEPS) -> Fitted:
+        """See `Fitter`; from where `start` ended, and with friction released."""
+        c = np.zeros(len(self.numbers_moved)) if start is None else start.coefficients
+        begun = [c]
+        if steps and start is not None and terms:
+            released = c.copy()
+            levels = [i for i, n in enumerate(self.numbers_moved) if n.name == LEVEL]
+            released[levels] += math.log(RELEASED)
+            begun += [released] if levels else []
+        few = FEW if len(begun) > 1 else 0
+        tried = [self._moved(one, list(terms), few, entries=True) for one in begun]
+        c, found, _ = min(tried, key=lambda t: t[2])
+        c, found, _ = self._moved(c, found, max(steps, FEW), entries=steps > 0)
+        return self._ended(c, found)
+
+    def _moved(
+        self, c: Floats, terms: list[Term], steps: int, *, entries: bool
+    ) -> tuple[Floats, list[Term], float]:
+        """Return numbers and terms after Levenberg-Marquardt steps, and what they leave with the prior."""
+        prior, use = self._prior(), self.use
+        rest = self.residual(c, terms)
+        count = int(self.rows.sum())
+
+        def left(c: Floats, rest: Floats, variance: float) -> float:
+            return float(np.sum(rest[self.rows] ** 2) + variance * np.sum(prior.precision * c**2))
+
+        variance = float(np.sum(rest[self.rows] ** 2)) / count
+        damping = 1e-2
+        for _ in range(steps):
+            free = all_free_of(terms, self.balance) if entries else []
+            columns = self._slopes(c, terms, free, rest)
+            y = rest + c @ columns[: c.size]
+            grams = Grams.of(columns, y, self.block, self.blocks)
+            power = np.diag(grams.gram[use].sum(axis=0)) / max(variance, 1e-300)
+            before, better = left(c, rest, variance), False
+            for _ in range(TRIES):
+                held = damping * power
+                precision = np.concatenate([prior.precision, np.zeros(len(free))]) + held
+                mean = held * np.concatenate([c, np.zeros(len(free))]) / np.maximum(precision, 1e-300)
+                wide = np.full(len(free), np.inf)
+                bounds = np.concatenate([prior.low, -wide]), np.concatenate([prior.high, wide])
+                moved = grams.solve(use, Prior(mean, precision, *bounds), variance)
+                other = c + np.clip(moved[: c.size] - c, -0.5, 0.5)
+                trial = list(terms)
+                for f, step in zip(free, moved[c.size :].tolist(), strict=True):
+                    f.put(trial, f.get(terms) + min(max(step, -f.most(terms)), f.most(terms)))
+                try:
+                    after = self.residual(other, trial)
+                except ConfigError:
+                    damping *= 10.0
+                    continue
+                if left(other, after, variance) < before:
+                    better = True
+                    break
+                damping *= 8.0
+            if not better:
+                break
+            c, terms, rest = other, trial, after
+            damping = max(0.2 * damping, 1e-5)
+            if left(c, rest, variance) > (1.0 - SETTLED) * before:
+                break
+            variance = float(np.sum(rest[self.rows] ** 2)) / count
+        return c, terms, left(c, rest, variance)
+
+    def _slopes(self, c: Floats, terms: list[Term], free: Sequence[Free], rest: Floats) -> Floats:
+        """Return what the model changes by with each number and each free parameter, (p + q, n)."""
+
+        def one(i: int) -> Floats:
+            for way in (1.0, -1.0):
+                other, trial = c.copy(), list(terms)
+                if i < c.size:
+                    other[i] += way * STEP
+                    moved = way * STEP
+                else:
+                    f = free[i - c.size]
+                    f.put(trial, f.get(terms) + way * f.step)
+                    moved = f.get(trial) - f.get(terms)
+                if moved == 0.0:
+                    continue
+                try:
+                    return (rest - self.residual(other, trial)) / moved
+                except ConfigError:
+                    continue
+            return np.zeros_like(rest)
+
+        return np.array(shared(one, range(c.size + len(free))))
+
+    def _ended(self, c: Floats, terms: list[Term]) -> Fitted:
+        rest = self.residual(c, terms)
+        free = all_free_of(terms, self.balance)
+        columns = self._slopes(c, terms, free, rest)
+        own, tangents = columns[: c.size], columns[c.size :]
+        y = rest + c @ own
+        nowhere = slice(c.size, c.size)
+        system = System(y, own, (nowhere,) * (len(self.balance.believed) + len(terms)))
+        prior = self._prior()
+        wide = prior.extended(np.full(len(free), -np.inf), np.full(len(free), np.inf))
+        joint = Grams.of(np.concatenate([own, tangents]), y, self.block, self.blocks)
+        sse = float(np.sum(rest[self.rows] ** 2))
+        variance = sse / max(int(self.rows.sum()), 1)
+        whole = np.concatenate([c, np.zeros(len(free))])
+        errors, without = left_out(joint, self.use, wide, variance, whole)
+        return Fitted(
+            tuple(terms), c, system, prior, rest, tangents, tuple(free), errors, without, sse, variance,
+            np.zeros(0),
+        )  # fmt: skip
+
+
+def _first(found: Sequence[tuple[float, Term]], count: int) -> list[Term]:
+    """Return the terms that leave least."""
+    order = np.argsort([left for left, _ in found], kind="stable")
+    return [found[i][1] for i in order[:count].tolist()]
+
+
+def _sized(entry: Entry) -> bool:
+    kind = ent.kind_of(entry)
+    return ent.adds_force(kind) and bool(kind.linear)

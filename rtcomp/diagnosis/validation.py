@@ -1,0 +1,50 @@
+"""The final judgement: relative force errors on the reserved blocks, once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.errors import RecordingError
+from rtcomp.stage.stage import Stage
+
+LEAST_FORCE = 0.01
+"""Part of the other blocks' force (rms) that the reserved ones must have to judge by it."""
+
+
+class Reserved:
+    """Blocks that took no part in fitting or selection; they judge once.
+
+    Raises RecordingError where nothing happens in them.
+    """
+
+    def __init__(self, balance: ForceBalance) -> None:
+        self._balance, self._judged = balance, False
+        force, rows = balance.drive_force(), balance.reserved[balance.block]
+        here, elsewhere = float(np.std(force[rows])), float(np.std(force[~rows]))
+        if here < LEAST_FORCE * elsewhere:
+            raise RecordingError(
+                f"nothing moves in the part kept for the judgement: its force varies by {here:.3g} N, "
+                f"that of the rest by {elsewhere:.3g} N; record motion throughout, or cut the rests"
+            )
+
+    def judge(self, stages: Mapping[str, Stage]) -> dict[str, float]:
+        """Return the relative force error (rms over rms) of each stage, and as ``noise`` the sensor's.
+
+        Raises RuntimeError when asked again: what is asked twice is selected on.
+        """
+        if self._judged:
+            raise RuntimeError("the reserved blocks have judged already")
+        self._judged = True
+        b = self._balance
+        rows = b.reserved[b.block]
+        found = {}
+        power = 0.0
+        for name, stage in stages.items():
+            drive, needed = b.both_sides(stage)
+            power = power or float(np.mean(drive[rows] ** 2))
+            found[name] = float(np.sqrt(np.mean((drive - needed)[rows] ** 2) / max(power, 1e-300)))
+        found["noise"] = float(np.sqrt(b.noise_power / max(power, 1e-300)))
+        return found

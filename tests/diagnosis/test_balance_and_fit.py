@@ -1,0 +1,275 @@
+"""Parts of the second diagnosis: properties and known truths of filters, tests, entries and regression."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from recorded import cut, run, stage, there_and_back
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.balance import ForceBalance, reserved_blocks
+from rtcomp.diagnosis.baseline import baseline
+from rtcomp.diagnosis.candidates import Candidate
+from rtcomp.diagnosis.data import load_data
+from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.regression import Grams
+from rtcomp.diagnosis.replicate import replicate
+from rtcomp.diagnosis.screening import Screen
+from rtcomp.diagnosis.selection import Search, doubts
+from rtcomp.diagnosis.significance import Null, confidence_set, log_gain, probabilities
+from rtcomp.diagnosis.spectrum import filtered, spectrum
+from rtcomp.diagnosis.stage_of import stage_of
+from rtcomp.diagnosis.validation import Reserved
+from rtcomp.errors import RecordingError
+from rtcomp.kernels import Floats
+from rtcomp.physics import Effect, catalogue
+from rtcomp.stage.balance import between_rows
+
+FORMS = [
+    (kind, form)
+    for kind in catalogue.entries()
+    if kind.searchable and ent.adds_force(kind) and kind.linear
+    for form in (list(kind.forms) or [""])
+]
+
+
+@given(st.integers(10, 25), st.sets(st.integers(0, 24)), st.sets(st.integers(0, 24)))
+def test_one_block_of_five_is_reserved_but_none_that_is_unlike_the_others(
+    count: int, stepped: set[int], furthest: set[int]
+) -> None:
+    found = reserved_blocks(count, stepped, furthest)
+    assert found.any()
+    unlike = stepped | furthest
+    if set(range(count - count % 5)) - unlike:
+        assert not unlike & set(np.flatnonzero(found).tolist())
+        for first in range(0, count - 2, 5):
+            group = set(range(first, min(first + 5, count)))
+            assert found[sorted(group)].sum() == bool(group - unlike)
+
+
+def one(frequency: Floats) -> Floats:
+    return np.ones_like(frequency)
+
+
+@given(st.floats(0.5, 20.0), st.floats(-3.0, 3.0), st.floats(-50.0, 50.0))
+@settings(max_examples=25, deadline=None)
+def test_a_derivative_is_that_of_the_closed_form(frequency: float, level: float, slope: float) -> None:
+    t = np.arange(4000) / 1000.0
+    omega = 2.0 * math.pi * frequency
+    made = filtered(level + slope * t + np.sin(omega * t), 1000.0, one, derivative=True)
+    inside = slice(600, -600)
+    assert np.allclose(made[inside], (slope + omega * np.cos(omega * t))[inside], atol=0.02 * omega)
+
+
+def test_a_spectrum_has_the_power_of_the_signal() -> None:
+    random = np.random.default_rng(3)
+    noise = 0.3 * random.standard_normal(60_000)
+    frequency, density = spectrum([noise], 500.0)
+    assert np.median(density[frequency > 10.0]) == pytest.approx(0.09 / 250.0, rel=0.05)
+
+
+def test_noise_at_an_end_is_no_step() -> None:
+    """A filter that is strong at low frequencies must not draw the last point out over the recording."""
+    random = np.random.default_rng(5)
+    noise = random.standard_normal(8000)
+    noise[-1] = 30.0
+
+    def low(frequency: Floats) -> Floats:
+        return 1.0 / (1.0 + (frequency / 2.0) ** 2)
+
+    quiet = filtered(noise, 1000.0, low, noisy=True)[-500:-100]
+    loud = filtered(noise, 1000.0, low)[-500:-100]
+    assert np.abs(quiet).max() < 0.2 * np.abs(loud).max()
+
+
+@pytest.mark.parametrize(("kind", "form"), FORMS, ids=[f"{k.name} {f}".strip() for k, f in FORMS])
+@given(data=st.data())
+@settings(max_examples=8, deadline=None)
+def test_sizes_of_a_basis_make_the_entry(kind: type[Effect], form: str, data: st.DataObject) -> None:
+    entry: dict[str, Any] = {"name": kind.name, **kind.example, **({"form": form} if form else {})}
+    for name in kind.linear:
+        if name in entry:
+            entry[name] = float(entry[name]) * data.draw(st.floats(0.1, 3.0))
+    sizes = ent.sizes_of(entry)
+    low, high = ent.bounds_of(entry)
+    assert len(ent.basis(entry)) == sizes.size == low.size == high.size
+    again = ent.composed(entry, sizes)
+    for name, value in entry.items():
+        if isinstance(value, float) and name != "phase":
+            assert again[name] == pytest.approx(value, rel=1e-9)
+
+
+def test_gains_are_those_of_refits_without_each_block() -> None:
+    random = np.random.default_rng(11)
+    rows, blocks = 1200, 12
+    block = np.arange(rows) * blocks // rows
+    model = random.standard_normal((3, rows))
+    extra = random.standard_normal((4, rows))
+    y = np.array([1.0, -2.0, 0.5]) @ model + 0.7 * extra[1] + random.standard_normal(rows)
+    spans = [extra[:1], extra[1:2], extra[2:]]
+    term = Term.of({"name": "constant-force", "force": 0.0})
+    free = [Candidate(term, (), s.copy(), np.full(len(s), -np.inf), np.full(len(s), np.inf)) for s in spans]
+    use = np.ones(blocks, dtype=np.bool_)
+    use[4] = False
+    seen = use[block]
+    c = np.linalg.lstsq(model[:, seen].T, y[seen], rcond=None)[0]
+    found = Screen(free, block, blocks, use).gains(model, y - c @ model)
+    for columns, screened in zip(spans, found, strict=True):
+        both = np.concatenate([model, columns])
+        logs = []
+        for k in np.flatnonzero(use):
+            rest, own = seen & (block != k), block == k
+            errors = []
+            for table in (model, both):
+                fit = np.linalg.lstsq(table[:, rest].T, y[rest], rcond=None)[0]
+                errors.append(np.sum((y[own] - fit @ table[:, own]) ** 2))
+            logs.append(np.log(errors[0] / errors[1]))
+        assert screened.gain == pytest.approx(np.mean(logs), abs=1e-4)
+        whole = np.linalg.lstsq(both[:, seen].T, y[seen], rcond=None)[0]
+        assert screened.sizes == pytest.approx(whole[3:], abs=1e-4)
+
+
+def test_a_gain_like_those_of_replicates_is_chance_and_a_larger_one_is_not() -> None:
+    random = np.random.default_rng(2)
+    null = Null(random.gumbel(0.02, 0.003, 19), random.normal(1000.0, 10.0, 19))
+    assert null.p_value(0.02) > 0.2
+    assert null.p_value(0.06) < 0.001
+    assert null.p_value(null.threshold(0.01)) == pytest.approx(0.01, rel=1e-3)
+    assert null.p_of_error(1000.0) > 0.2 and null.p_of_error(1200.0) < 0.01
+
+
+@given(st.integers(0, 1000))
+@settings(max_examples=20, deadline=None)
+def test_a_model_that_is_worse_in_every_block_is_not_in_the_confidence_set(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    good = random.uniform(1.0, 2.0, 15)
+    models = [good, good * random.uniform(1.3, 1.8, 15), good * np.exp(random.normal(0.0, 1e-3, 15))]
+    members = confidence_set(models, 0.05)
+    assert 0 in members or 2 in members
+    assert 1 not in members
+    weights = probabilities(models, 200.0)
+    assert weights.sum() == pytest.approx(1.0) and weights[1] < 0.01
+    assert log_gain(models[1], models[0]) > 0.0
+
+
+def test_reserved_blocks_judge_once() -> None:
+    believed = stage()
+    balance = ForceBalance(believed, load_data([run(believed, there_and_back())]))
+    baseline(balance)
+    reserved = Reserved(balance)
+    errors = reserved.judge({"before": believed})
+    assert errors["before"] < 3.0 * errors["noise"] + 0.01
+    with pytest.raises(RuntimeError, match="judged already"):
+        reserved.judge({"before": believed})
+
+
+def test_a_judgement_needs_motion_in_the_reserved_blocks() -> None:
+    believed, moving = stage(), there_and_back(20.0)
+    t = np.arange(moving.size) / 1000.0
+    resting = np.any([np.abs(t - middle) < 1.6 for middle in (5.0, 15.0)], axis=0)  # the third block of five
+    balance = ForceBalance(believed, load_data([run(believed, np.where(resting, 0.0, moving))]))
+    baseline(balance)
+    assert balance.blocks == 10
+    with pytest.raises(RecordingError, match="nothing moves in the part kept for the judgement"):
+        Reserved(balance)
+
+
+def test_friction_remembers_the_way_to_a_window() -> None:
+    believed, whole = stage(), run(stage(), there_and_back(72.0))
+    balance = ForceBalance(believed, load_data([whole]))
+    windows, (everything,) = balance.data.segments, load_data([cut(whole, 0, 64_000)]).segments
+    assert len(windows) > 1 and everything.before is None
+    path = balance._path(everything, [])
+    along = balance._units(balance.stage, everything, path, [], [], None)
+    inside = [w for w in windows[1:] if w.time[-1] < everything.time[-1]]
+    assert inside
+    for window in inside:
+        first = round(float(window.time[0]) * 1000.0)
+        part = path.part(slice(first, first + window.time.size))
+        units = balance._units(balance.stage, window, part, [], [], None)
+        stops = slice(2 + balance.reaches.size // 2, None)  # short ones forget the way at once
+        assert units[10:-10, stops] == pytest.approx(
+            along[first + 10 : first + window.time.size - 10, stops], abs=0.02 * float(balance.reaches[-1])
+        )
+
+
+@given(st.lists(st.floats(-3.0, 3.0), min_size=4, max_size=4), st.floats(0.0, 1.0))
+@settings(max_examples=50, deadline=None)
+def test_between_rows_a_position_is_the_cubic_through_both(terms: list[float], share: float) -> None:
+    cubic = np.polynomial.Polynomial(terms)
+    time = np.arange(4) * 0.5
+    motion = np.column_stack([time, cubic(time), cubic.deriv()(time), np.zeros(4), np.zeros(4)])
+    assert between_rows(motion, 2, share) == pytest.approx(float(cubic(1.0 - 0.5 * share)), abs=1e-9)
+
+
+def test_a_replicate_of_averaged_rows_is_read_in_counts() -> None:
+    """At rest a reading stays at its count, however many rows are averaged."""
+    coarse = stage().with_changes(sensor={"noise": 1e-7, "resolution": 1e-6})
+    moving = there_and_back(20.0)
+    resting = np.where(np.arange(moving.size) % 10_000 < 4000, 0.0, moving)
+    data = load_data([run(coarse, resting)], bandwidth=12.0)
+    assert data.averaged > 1
+    made = replicate(coarse, data, [s.position for s in data.segments], 1e-7, seed=3)
+    assert made is not None
+    (segment,) = made.segments
+    assert segment.source is not None
+    counts = segment.source.position / 1e-6
+    assert counts == pytest.approx(np.round(counts), abs=1e-6)
+    assert segment.position == pytest.approx(
+        segment.source.position.reshape(-1, data.averaged).mean(axis=1), abs=1e-12
+    )
+
+
+def test_a_fit_is_blind_to_reserved_rows() -> None:
+    believed = stage()
+    balance = ForceBalance(believed, load_data([run(believed, there_and_back(20.0))]))
+    fitter, fitted = Fitter(balance), baseline(balance)
+    rows = balance.reserved[balance.block]
+    assert 0.1 < rows.mean() < 0.3
+    spoilt = np.where(rows, 1e6, fitted.system.y)
+    grams = Grams.of(fitted.system.columns, spoilt, balance.block, balance.blocks)
+    found = grams.solve(fitter.use, fitted.prior, fitted.variance)
+    assert found == pytest.approx(fitted.coefficients, rel=0.05, abs=1.0)
+    assert grams.errors(found, fitter.use).sum() == pytest.approx(fitted.sse, rel=1e-3)
+
+
+def test_a_stage_of_a_fit_is_the_belief_where_nothing_is_missing() -> None:
+    believed = stage()
+    balance = ForceBalance(believed, load_data([run(believed, there_and_back(20.0))]))
+    fitted = baseline(balance)
+    found = stage_of(balance, fitted)
+    assert found.mass == pytest.approx(2.0, rel=0.02)
+    drive, needed = balance.both_sides(found)
+    assert np.sqrt(np.mean((drive - needed) ** 2) / np.mean(drive**2)) < 0.02
+
+
+def test_friction_that_nobody_believes_is_found_to_the_noise() -> None:
+    """A belief without friction: a dense grid of yield displacements, thinned, leaves what noise leaves."""
+    truth = stage()
+    thin = type(truth).from_dict({"stage": {"mass": 2.0, "force_constant": 4.0, "voltage_limit": 10.0}})
+    recording = run(truth, there_and_back(20.0))
+    known = ForceBalance(truth, load_data([recording]))
+    open_to_all = ForceBalance(thin, load_data([recording]))
+    right, found = baseline(known), baseline(open_to_all)
+    whole = float(known.power), float(open_to_all.power)
+    assert found.sse / whole[1] < 4.0 * right.sse / whole[0] + 1e-4
+    assert found.coefficients[0] == pytest.approx(2.0, rel=0.03)
+
+
+@pytest.mark.parametrize(("bump", "said"), [(0.0, ""), (1.5, "more is left than it explains")])
+def test_an_effect_is_doubted_where_more_is_left_than_it_explains(bump: float, said: str) -> None:
+    wave = {"name": "cogging", "amplitude": 0.2, "period": 3e-4, "phase": 0.4}
+    knots = [-1e-3, 1e-4, 1.3e-4, 1.6e-4, 1e-3]
+    body = {"name": "position-force", "knots": knots, "values": [0.0, 0.0, bump, 0.0, 0.0]}
+    truth = stage(effects=[wave, body] if bump else [wave])
+    balance = ForceBalance(stage(), load_data([run(truth, there_and_back(20.0))]))
+    base, fitter = baseline(balance), Fitter(balance)
+    chosen = fitter.fit([Term.of(wave)], base)
+    noise = Null(np.ones(19), chosen.errors.size * np.linspace(0.9, 1.1, 19))
+    assert doubts(fitter, Search(base, chosen, noise)) == [said]

@@ -1,0 +1,124 @@
+"""How certain numbers are said to be: by blocks left out, by happening once, by being chosen to be told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from recorded import run, there_and_back
+from recorded import stage as axis
+from scipy.signal import lfilter
+
+from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.baseline import baseline
+from rtcomp.diagnosis.data import load_data
+from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.intervals import numbers as numbers_of
+from rtcomp.diagnosis.pipeline import diagnose
+from rtcomp.diagnosis.retuned import Numbers, all_by_one_factor, force_constant, retunings, widening
+from rtcomp.diagnosis.spread import elsewhere, scatter
+
+
+def test_blocks_left_out_tell_how_uncertain_a_mean_is() -> None:
+    chance = np.random.default_rng(5)
+    found = []
+    for _ in range(400):
+        blocks = chance.standard_normal((20, 2)) * [1.0, 3.0]
+        found.append(scatter((blocks.sum(axis=0) - blocks) / 19.0))
+    mean = np.mean(found, axis=0)
+    assert np.diag(mean) == pytest.approx([1.0 / 20.0, 9.0 / 20.0], rel=0.15)
+    assert abs(mean[0, 1]) < 0.01
+
+
+def test_blocks_like_their_neighbours_count_as_fewer() -> None:
+    chance = np.random.default_rng(6)
+    plain, alike = [], []
+    for _ in range(200):
+        walk = chance.standard_normal((21, 1))
+        plain.append(scatter(walk[1:])[0, 0])
+        alike.append(scatter((walk[1:] + walk[:-1]) / np.sqrt(2.0))[0, 0])
+    assert np.mean(alike) > 1.2 * np.mean(plain)
+
+
+@pytest.mark.parametrize("alike", [0.0, 0.8])
+def test_what_happened_once_is_as_uncertain_as_what_noise_makes_of_it_elsewhere(alike: float) -> None:
+    """As wide as least squares scatters over many noises, white or alike for a few rows."""
+    chance = np.random.default_rng(7)
+    column = np.zeros(4000)
+    column[1500:1540] = np.sin(np.arange(40) / 5.0)
+    told, found = [], []
+    for _ in range(200):
+        noise = lfilter([1.0], [1.0, -alike], chance.standard_normal(column.size))
+        told.append(elsewhere(column, noise))
+        found.append(column @ noise / (column @ column))
+    assert np.mean(told) == pytest.approx(np.var(found), rel=0.25)
+    if alike == 0.0:
+        assert np.mean(told) == pytest.approx(1.0 / (column @ column), rel=0.05)
+
+
+def test_numbers_told_because_they_moved_have_wider_intervals() -> None:
+    """As Benjamini and Yekutieli have it: all chosen, plain intervals; one of many, much wider ones."""
+    assert widening(np.full(5, 9.0), 5) == pytest.approx(1.0, rel=1e-3)
+    one, two = widening(np.array([9.0, 0, 0, 0, 0]), 5), widening(np.array([9.0, 9.0, 0, 0, 0]), 5)
+    assert 1.1 < two < one < 1.6
+    assert widening(np.array([1.1, 0, 0, 0, 0]), 5) == np.inf  # too little to be told
+
+
+def numbers(*moved: float, half: float = 0.01) -> Numbers:
+    """Numbers of 1 that moved to these; half widths of their intervals."""
+    values = np.array([*moved, 1.0])
+    return Numbers(np.ones(5), values, np.full(5, half))
+
+
+@pytest.mark.parametrize(
+    ("told", "factor"),
+    [
+        (numbers(1.1, 1.1, 1.1, 1.1), 1.1),
+        (numbers(0.93, 0.94, 0.93, 0.935), 0.934),
+        (numbers(1.1, 1.1, 1.1, 1.0), None),  # friction's level is as believed
+        (numbers(1.1, 1.04, 1.1, 1.1), None),
+        (numbers(1.1, 1.1, 1.0, 1.1, half=0.2), None),  # nothing is known
+        (numbers(1.01, 1.01, 1.01, 1.01, half=0.001), None),  # a hundredth is no news
+    ],
+)
+def test_forces_that_all_moved_by_one_factor_are_another_force_constant(
+    told: Numbers, factor: float | None
+) -> None:
+    found = all_by_one_factor(told)
+    if factor is None:
+        assert found is None
+        return
+    assert found is not None and found[0] == pytest.approx(factor, abs=0.003)
+    one = force_constant(axis(), *found)
+    assert one.after.value == pytest.approx(one.before / factor, rel=0.003)
+    assert one.after.low < one.after.value < one.after.high
+
+
+def test_a_number_that_is_not_believed_says_nothing_of_the_others() -> None:
+    some = numbers(1.1, 0.0, 0.0, 1.1)
+    zero = np.array([1.0, 0.0, 0.0, 1.0, 1.0])
+    assert all_by_one_factor(replace(some, before=zero)) is None  # two are too few
+    three = replace(numbers(1.1, 1.1, 0.0, 1.1), before=np.array([1.0, 1.0, 0.0, 1.0, 1.0]))
+    assert all_by_one_factor(three) is not None
+
+
+def test_a_mass_that_is_another_is_told_with_an_interval_that_holds_it() -> None:
+    true, believed = axis(mass=2.0 * 1.09), axis()
+    balance = ForceBalance(believed, load_data([run(true, there_and_back(8.0))]))
+    (told,) = retunings(numbers_of(Fitter(balance), believed, baseline(balance)), "linear")
+    assert told.parameter == "mass"
+    assert told.after.low <= true.mass <= told.after.high
+
+
+def test_a_force_constant_that_is_another_is_told_as_such_and_moves_alike() -> None:
+    true, believed = axis(force_constant=4.0 / 1.08), axis()
+    motion = run(true, there_and_back(8.0))
+    done = diagnose(believed, [motion])
+    assert done.verdict == "retuned"
+    (told,) = done.retuned
+    assert told.parameter == "force_constant"
+    assert told.after.low <= true.force_constant <= told.after.high
+    assert done.stage.force_constant == pytest.approx(true.force_constant, rel=0.02)
+    assert done.stage.mass == pytest.approx(believed.mass, rel=0.03)
+    assert done.fit.after < 0.2 * done.fit.before
