@@ -16,7 +16,7 @@ from rtcomp.diagnosis.detectability import sights
 from rtcomp.diagnosis.experiment import next_experiment
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
-from rtcomp.diagnosis.intervals import Told, numbers, told
+from rtcomp.diagnosis.intervals import Told, believed_sizes, numbers, told
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
 from rtcomp.diagnosis.retuned import Numbers, all_by_one_factor, force_constant, retunings
@@ -166,6 +166,8 @@ def _stages(
     if factor is not None:
         stages = {name: with_forces(stage, 1.0 / factor[0]) for name, stage in stages.items()}
         moved = [force_constant(believed, *factor)]
+    else:
+        moved += believed_sizes(fitter, final)
     return stages, moved + _found(fitter.balance, believed, tuned)
 
 

@@ -149,6 +149,13 @@ class Fitter:
 
         return of(model.coefficients), np.array([of(c) for c in model.without]), sizes
 
+    def believed_as(self, model: Fitted, c: Floats) -> list[Entry]:
+        """Return the believed entries whose sizes are refitted, with those of coefficients `c` of a model."""
+        return [
+            ent.composed(e, c[span])
+            for e, span in zip(self.balance.believed, model.system.of_entry, strict=False)
+        ]
+
     def position(self, before: Stage, retuned: Stage, after: Stage, seed: int) -> PositionFit | None:
         """Return errors of position on the reserved part; None where forces judge."""
         return None

@@ -11,8 +11,8 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import ONCE, Fitted, left_out
 from rtcomp.diagnosis.regression import Grams
-from rtcomp.diagnosis.result import Value
-from rtcomp.diagnosis.retuned import Numbers, believed_friction
+from rtcomp.diagnosis.result import Retuned, Value
+from rtcomp.diagnosis.retuned import MOVED, Numbers, believed_friction
 from rtcomp.diagnosis.spread import MODEL, elsewhere, scatter
 from rtcomp.kernels import Floats
 from rtcomp.stage.stage import Stage
@@ -137,6 +137,27 @@ def _once(fitter: Fitter, fitted: Fitted, at: int, span: slice) -> dict[str, flo
         if free.term == at and alone(tangent[use]):
             sd = math.sqrt(elsewhere(tangent[use], rest))
             found[free.name] = sd * (float(fitted.terms[at].entry[free.name]) if free.log else 1.0)
+    return found
+
+
+def believed_sizes(fitter: Fitter, fitted: Fitted) -> list[Retuned]:
+    """Return the sizes of believed effects that moved, each by more than its 95 % interval."""
+    from scipy.stats import t as student
+
+    axis = fitter.balance.stage.axis
+    factor = float(student.ppf(0.975, max(fitted.without.shape[0] - 1, 1)))
+    now = fitter.believed_as(fitted, fitted.coefficients)
+    others = [fitter.believed_as(fitted, c) for c in fitted.without]
+    found = []
+    for i, (was, entry) in enumerate(zip(fitter.balance.believed, now, strict=False)):
+        kind = ent.kind_of(was)
+        for p in (ent.parameter(kind, n) for n in kind.linear if n in was):
+            before, value = float(was[p.name]), float(entry[p.name])
+            sd = _deviation(np.array([float(one[i][p.name]) for one in others]))
+            half = math.hypot(factor * sd, MODEL * abs(value))
+            if before != 0.0 and abs(value - before) > max(half, MOVED * abs(before)):
+                told = Value(value, value - half, value + half, for_axis(p.unit, axis))
+                found.append(Retuned(f"{kind.name}.{p.name}", before, told))
     return found
 
 

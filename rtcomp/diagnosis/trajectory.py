@@ -206,6 +206,11 @@ class Trajectory(Fitter):
         balance = self.balance.on(data)
         return Trajectory(balance, self.believed, self.windows.on(balance), self.scale)
 
+    def believed_as(self, model: Fitted, c: Floats) -> list[Entry]:
+        """See `Fitter`."""
+        effects = self._stage(c[: len(self.numbers_moved)], []).mechanics.effects
+        return [dict(e) for e in effects if _sized(dict(e))]
+
     def position(self, before: Stage, retuned: Stage, after: Stage, seed: int) -> PositionFit | None:
         """See `Fitter`: mean absolute errors (m) over windows that lie in reserved blocks."""
         which = self.windows.block == GROUPS

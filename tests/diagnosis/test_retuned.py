@@ -122,3 +122,13 @@ def test_a_force_constant_that_is_another_is_told_as_such_and_moves_alike() -> N
     assert done.stage.force_constant == pytest.approx(true.force_constant, rel=0.02)
     assert done.stage.mass == pytest.approx(believed.mass, rel=0.03)
     assert done.fit.after < 0.2 * done.fit.before
+
+
+def test_the_size_of_a_believed_effect_that_is_another_is_told() -> None:
+    cogging = {"name": "cogging", "amplitude": 0.5, "period": 1e-4, "phase": 0.4}
+    believed = axis(effects=[{**cogging, "amplitude": 0.4}])
+    done = diagnose(believed, [run(axis(effects=[cogging]), there_and_back(8.0))])
+    assert done.verdict == "retuned"
+    (told,) = [r for r in done.retuned if r.parameter == "cogging.amplitude"]
+    assert told.before == 0.4 and told.after.low <= 0.5 <= told.after.high
+    assert told.after.unit == "N"
