@@ -32,6 +32,8 @@ from rtcomp.stage.stage import Stage
 
 STEPS = 10
 """Gauss-Newton steps at most."""
+FURTHEST = 5.0
+"""Prior standard deviations from its believed size within which an effect may always be."""
 SETTLED = 1e-4
 """Relative gain of a step below which the fit ends."""
 
@@ -194,6 +196,9 @@ class Fitter:
                 low[span], high[span] = ent.bounds_of(term.entry)
         for term, span in zip(self._believed, system.of_entry, strict=False):
             sizes = ent.sizes_of(term.entry)
+            # What is believed is possible, on whichever side of nothing a search would look for it.
+            wide = FURTHEST * BELIEF_SD * np.abs(sizes)
+            low[span], high[span] = np.minimum(low[span], sizes - wide), np.maximum(high[span], sizes + wide)
             near = sizes != 0.0
             where = np.arange(span.start, span.stop)
             mean[where[near]] = sizes[near]

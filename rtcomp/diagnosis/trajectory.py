@@ -10,13 +10,12 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.balance import BASE, ForceBalance, System
+from rtcomp.diagnosis.balance import ForceBalance, System
+from rtcomp.diagnosis.belief import Belief, is_sized
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.data import Data
 from rtcomp.diagnosis.entries import Entry
@@ -26,9 +25,6 @@ from rtcomp.diagnosis.free import Free, Term, all_free_of
 from rtcomp.diagnosis.regression import Grams, Prior
 from rtcomp.diagnosis.replicate import replicate
 from rtcomp.diagnosis.result import PositionFit
-from rtcomp.diagnosis.retuned import level_and_reach
-from rtcomp.diagnosis.settings import BELIEF_SD
-from rtcomp.diagnosis.stage_of import merged
 from rtcomp.diagnosis.windows import GROUPS, Windows
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
@@ -52,18 +48,6 @@ TRIES = 4
 """Dampings tried for one step."""
 
 
-@dataclass(frozen=True)
-class Number:
-    """A number of the belief: its name, or the place of a believed entry's size; what it is moved by."""
-
-    name: str
-    scale: float
-    """What 1 stands for: a factor of e where it is positive (0), else so much more."""
-    near: bool
-    """Whether the belief holds it near its value."""
-    at: int = 0
-
-
 class Trajectory(Fitter):
     """Fits models to where the axis went."""
 
@@ -71,11 +55,11 @@ class Trajectory(Fitter):
 
     def __init__(self, balance: ForceBalance, stage: Stage, windows: Windows, scale: float) -> None:
         super().__init__(balance)
-        self.believed, self.windows, self.scale = stage, windows, scale
-        """The stage whose numbers are moved; where it is let go; error (m) beyond which one counts less."""
+        volts = np.concatenate([s.voltage for s in balance.data.segments])
+        force = stage.force_constant * float(np.sqrt(np.mean(volts**2)))
+        self.belief, self.windows, self.scale = Belief(stage, force), windows, scale
+        """The numbers that are moved; where a stage is let go; error (m) beyond which one counts less."""
         self._rows = windows.rows
-        self._own = [dict(e) for e in stage.mechanics.effects if _sized(dict(e))]
-        self.numbers_moved = self._numbers()
         moved = windows.moved()[windows.block < GROUPS]
         self._power = float(np.sum((moved / scale) ** 2))
 
@@ -204,12 +188,12 @@ class Trajectory(Fitter):
     def on(self, data: Data) -> Trajectory:
         """See `Fitter`."""
         balance = self.balance.on(data)
-        return Trajectory(balance, self.believed, self.windows.on(balance), self.scale)
+        return Trajectory(balance, self.belief.stage, self.windows.on(balance), self.scale)
 
     def believed_as(self, model: Fitted, c: Floats) -> list[Entry]:
         """See `Fitter`."""
-        effects = self._stage(c[: len(self.numbers_moved)], []).mechanics.effects
-        return [dict(e) for e in effects if _sized(dict(e))]
+        effects = self._stage(c[: len(self.belief.numbers)], []).mechanics.effects
+        return [dict(e) for e in effects if is_sized(dict(e))]
 
     def position(self, before: Stage, retuned: Stage, after: Stage, seed: int) -> PositionFit | None:
         """See `Fitter`: mean absolute errors (m) over windows that lie in reserved blocks."""
@@ -226,71 +210,17 @@ class Trajectory(Fitter):
 
     def quick(self, terms: Sequence[Term]) -> float:
         """See `Fitter`."""
-        return float(np.sum(self.residual(np.zeros(len(self.numbers_moved)), terms)[self.rows] ** 2))
-
-    # -- numbers and stage --------------------------------------------------------------------------------
-
-    def _numbers(self) -> list[Number]:
-        m = self.believed.mechanics
-        found = [Number(n, 0.0, near=True) for n in BASE if float(getattr(m, n)) > 0.0]
-        if isinstance(m.friction, list):
-            found += [Number(LEVEL, 0.0, near=False), Number(REACH, 0.0, near=False)]
-        volts = np.concatenate([s.voltage for s in self.balance.data.segments])
-        force = self.believed.force_constant * float(np.sqrt(np.mean(volts**2)))
-        for i, size in enumerate(self._sizes()):
-            found.append(Number("size", abs(size) or 0.1 * force, near=size != 0.0, at=i))
-        return found
-
-    def _sizes(self) -> Floats:
-        return np.concatenate([np.zeros(0), *(ent.sizes_of(e) for e in self._own)])
-
-    def _stage(self, c: Floats, terms: Sequence[Term]) -> Stage:
-        """Return the stage of numbers `c` and of `terms`; raise ConfigError where one is out of range."""
-        data = self.believed.to_dict()
-        m: dict[str, Any] = data["stage"]
-        sizes, level, reach = self._sizes(), 1.0, 1.0
-        for number, value in zip(self.numbers_moved, c.tolist(), strict=True):
-            if number.name == LEVEL:
-                level = math.exp(value)
-            elif number.name == REACH:
-                reach = math.exp(value)
-            elif number.scale == 0.0:
-                m[number.name] *= math.exp(value)
-            else:
-                sizes[number.at] += value * number.scale
-        if isinstance(m.get("friction"), list):
-            m["friction"] = [
-                {"stiffness": e["stiffness"] * level / reach, "reach": e["reach"] * reach}
-                for e in m["friction"]
-            ]
-        at, effects = 0, []
-        for entry in m.get("effects", []):
-            mine = dict(entry)
-            if _sized(mine):
-                count = ent.sizes_of(entry).size
-                mine, at = ent.composed(mine, sizes[at : at + count]), at + count
-            effects.append(mine)
-        effects = merged([*effects, *(t.entry for t in terms)])
-        m["effects"] = effects
-        if not effects:
-            del m["effects"]
-        return Stage.from_dict(data)
+        return float(np.sum(self.residual(np.zeros(len(self.belief.numbers)), terms)[self.rows] ** 2))
 
     def numbers(self, model: Fitted, *, effects: bool) -> tuple[Floats, Floats, Floats]:
         """See `Fitter`."""
-        sizes = self._sizes() if effects else np.zeros(0)
-        sign = np.where(sizes < 0.0, -1.0, 1.0)
+        size = len(self.belief.numbers)
+        sizes = self.belief.sizes if effects else np.zeros(0)
+        sets = [self.belief.values(c[:size], sizes.size) for c in model.without]
+        return self.belief.values(model.coefficients, sizes.size), np.array(sets), sizes
 
-        def of(c: Floats) -> Floats:
-            stage = self._stage(c[: len(self.numbers_moved)], [])
-            m = stage.mechanics
-            friction = m.friction if isinstance(m.friction, list) else []
-            held = level_and_reach([(e.stiffness, e.reach) for e in friction]) if friction else (0.0, 0.0)
-            believed = [ent.sizes_of(dict(e)) for e in m.effects if _sized(e)] if effects else []
-            own = np.concatenate([np.zeros(0), *believed])[: sizes.size]
-            return np.array([*(float(getattr(m, n)) for n in BASE), *held, *(sign * own)])
-
-        return of(model.coefficients), np.array([of(c) for c in model.without]), sizes
+    def _stage(self, c: Floats, terms: Sequence[Term]) -> Stage:
+        return self.belief.moved(c, [t.entry for t in terms])
 
     # -- residuals and fits -------------------------------------------------------------------------------
 
@@ -303,18 +233,13 @@ class Trajectory(Fitter):
         """Return the residual (n,) of numbers `c` (p,) and `terms`; raise ConfigError where out of range."""
         return self._bent(self.windows.off(self._stage(c, terms)))
 
-    def _prior(self) -> Prior:
-        size = len(self.numbers_moved)
-        near = np.array([n.near for n in self.numbers_moved], dtype=np.float64)
-        return Prior(np.zeros(size), near / BELIEF_SD**2, np.full(size, -FAR), np.full(size, FAR))
-
     def fit(self, terms: Sequence[Term], start: Fitted | None = None, steps: int = STEPS) -> Fitted:
         """See `Fitter`; from where `start` ended, and with friction released."""
-        c = np.zeros(len(self.numbers_moved)) if start is None else start.coefficients
+        c = np.zeros(len(self.belief.numbers)) if start is None else start.coefficients
         begun = [c]
         if steps and start is not None and terms:
             released = c.copy()
-            levels = [i for i, n in enumerate(self.numbers_moved) if n.name == LEVEL]
+            levels = [i for i, n in enumerate(self.belief.numbers) if n.name == LEVEL]
             released[levels] += math.log(RELEASED)
             begun += [released] if levels else []
         few = FEW if len(begun) > 1 else 0
@@ -327,7 +252,7 @@ class Trajectory(Fitter):
         self, c: Floats, terms: list[Term], steps: int, *, entries: bool
     ) -> tuple[Floats, list[Term], float]:
         """Return numbers and terms after Levenberg-Marquardt steps, and what they leave with the prior."""
-        prior, use = self._prior(), self.use
+        prior, use = self.belief.prior, self.use
         rest = self.residual(c, terms)
         count = int(self.rows.sum())
 
@@ -403,7 +328,7 @@ class Trajectory(Fitter):
         y = rest + c @ own
         nowhere = slice(c.size, c.size)
         system = System(y, own, (nowhere,) * (len(self.balance.believed) + len(terms)))
-        prior = self._prior()
+        prior = self.belief.prior
         wide = prior.extended(np.full(len(free), -np.inf), np.full(len(free), np.inf))
         joint = Grams.of(np.concatenate([own, tangents]), y, self.block, self.blocks)
         sse = float(np.sum(rest[self.rows] ** 2))
@@ -420,8 +345,3 @@ def _first(found: Sequence[tuple[float, Term]], count: int) -> list[Term]:
     """Return the terms that leave least."""
     order = np.argsort([left for left, _ in found], kind="stable")
     return [found[i][1] for i in order[:count].tolist()]
-
-
-def _sized(entry: Entry) -> bool:
-    kind = ent.kind_of(entry)
-    return ent.adds_force(kind) and bool(kind.linear)

@@ -105,7 +105,7 @@ if __name__ == "__main__":
     sys.path.pop(0)  # this folder, which the script does not have
     import narwhals  # noqa: F401  # of plotly, which asks for it as late as a figure is made
 
-    import rtcomp.diagnosis.diagnose
+    import rtcomp.diagnosis.pipeline
     import rtcomp.jobs.compensate
     import rtcomp.jobs.inspect
     import rtcomp.jobs.replay

@@ -1,0 +1,195 @@
+"""An axis that sticks finer than its encoder sees is judged by where short simulations end."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.baseline import baseline
+from rtcomp.diagnosis.data import load_data
+from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.pipeline import diagnose
+from rtcomp.diagnosis.replicate import replicate
+from rtcomp.diagnosis.sticking import MUCH, hidden, mostly_hidden
+from rtcomp.diagnosis.trajectory import Trajectory
+from rtcomp.diagnosis.windows import GROUPS, Windows
+from rtcomp.jobs.demo import shipped
+from rtcomp.recording.driven import driven
+from rtcomp.recording.reader import Recording, read
+from rtcomp.stage.simulate import Simulator
+from rtcomp.stage.stage import Stage
+
+RATE = 200.0
+COUNT = 1.5e-3
+BELIEF: dict[str, Any] = {
+    "stage": {
+        "axis": "rotary",
+        "mass": 7.0e-3,
+        "force_constant": 8.0e-4,
+        "voltage_limit": 885.0,
+        "viscous": 0.03,
+        "friction": [{"stiffness": 40.0, "reach": 1.0e-3}],
+        "effects": [{"name": "gravity", "amplitude": -0.48}],
+    },
+    "sensor": {"resolution": COUNT},
+    "rate": RATE,
+}
+LOAD = {"name": "load-dependent-friction", "coefficient": 0.25}
+
+
+def stage(*effects: dict[str, Any], **changes: Any) -> Stage:
+    """The pendulum with further effects and other values."""
+    section = {**BELIEF["stage"], **changes}
+    return Stage.from_dict({**BELIEF, "stage": {**section, "effects": [*section["effects"], *effects]}})
+
+
+def recorded(axis: Stage, seconds: float = 12.0, gain: float = 500.0, pace: float = 1.0) -> Recording:
+    """The pendulum under a proportional controller that a slow and a fast wave lead."""
+    time = np.arange(round(seconds * RATE)) / RATE
+    reference = 1.5 * np.sin(pace * time) + 0.5 * np.sin(4.3 * pace * time) * np.sin(2.0 * pace * time)
+    simulator = Simulator(axis)
+    position, voltage = np.empty_like(time), np.empty_like(time)
+    for k in range(time.size):
+        position[k] = simulator.measure()
+        voltage[k] = np.clip(gain * (reference[k] - position[k]), -885.0, 885.0)
+        simulator.advance(float(voltage[k]), 1.0 / RATE)
+    columns = {"time": time, "reference": reference, "position": position, "voltage": voltage}
+    return Recording(columns, RATE)
+
+
+def both(plant: Stage) -> list[Recording]:
+    """Two recordings, at two gains and paces."""
+    return [recorded(plant), recorded(plant, gain=300.0, pace=1.4)]
+
+
+def balanced(believed: Stage, data: list[Recording]) -> ForceBalance:
+    """The force balance on whose blocks windows are cut."""
+    balance = ForceBalance(believed, load_data(data))
+    baseline(balance)
+    return balance
+
+
+@pytest.fixture(scope="module")
+def loaded() -> list[Recording]:
+    """Recordings of a pendulum whose friction grows with its load."""
+    return both(stage(LOAD))
+
+
+def test_sticking_finer_than_a_count_is_told_from_rest_and_from_motion() -> None:
+    axis = stage()
+    rows = np.arange(600)
+    position = np.where(rows < 300, 0.2, 0.2 + (rows - 300) * 5e-3) + COUNT * 0.4 * (rows % 2)
+    changing = 200.0 + 100.0 * np.sin(rows / 20.0)
+    found = hidden(axis, position, changing, COUNT)
+    assert found[:300].all() and not found[305:].any()
+    assert not hidden(axis, position, np.full(600, 200.0), COUNT).any()
+    assert not hidden(axis, position, changing, 0.0).any()
+
+
+def test_presliding_that_the_sensor_resolves_is_not_hidden() -> None:
+    plant = stage(friction=[{"stiffness": 1.0, "reach": 0.04}])
+    sees = Stage.from_dict({**plant.to_dict(), "sensor": {"resolution": 1e-6}})
+    assert (
+        mostly_hidden(sees, [recorded(sees)]) < 0.02 < MUCH < mostly_hidden(stage(), [recorded(stage(LOAD))])
+    )
+
+
+def test_windows_lie_apart_and_those_of_reserved_blocks_are_a_group_of_their_own(
+    loaded: list[Recording],
+) -> None:
+    balance = balanced(stage(), loaded)
+    windows = Windows.of(balance)
+    assert all(np.all(np.diff(starts) >= windows.rows) for starts in windows.starts)
+    assert set(windows.block) == set(range(GROUPS + 1))
+    assert np.count_nonzero(windows.block == GROUPS) == np.count_nonzero(windows.reserved)
+    before, at = 0, 0
+    for segment, starts in zip(balance.data.segments, windows.starts, strict=True):
+        kept = balance.whitening.rows(segment)
+        for start in starts:
+            number = before + (start + np.arange(windows.rows) - kept.start) // kept.step
+            inside = number[number < before + segment.time[kept].size]
+            assert len(set(balance.block[inside])) == 1
+            assert balance.reserved[balance.block[inside[0]]] == windows.reserved[at]
+            at += 1
+        before += segment.time[kept].size
+
+
+def test_the_right_stage_is_off_by_what_the_sensor_leaves(loaded: list[Recording]) -> None:
+    right, believed = stage(LOAD), stage()
+    balance = balanced(believed, loaded)
+    windows = Windows.of(balance)
+    motion = [p.x for p in balance.paths()]
+    data = replicate(right, balance.data, motion, balance.noise.rms, 1)
+    assert data is not None
+    floor = np.abs(windows.on(balance.on(data)).off(right)).mean()
+    assert np.abs(windows.off(right)).mean() < 3.0 * floor
+    assert np.abs(windows.off(believed)).mean() > 6.0 * floor
+
+
+def test_numbers_that_are_off_come_back() -> None:
+    data = both(stage())
+    # All forces by one factor more: the force constant is what everything is measured by.
+    off = stage(mass=7.7e-3, viscous=0.036, friction=[{"stiffness": 55.0, "reach": 1.0e-3}])
+    fitter = Trajectory.of(balanced(off, data), off)
+    model = fitter.fit([])
+    found = fitter.stage(model)
+    assert found.mass == pytest.approx(7.0e-3, rel=0.03)
+    assert found.friction.level == pytest.approx(0.04, rel=0.05)  # type: ignore[union-attr]
+    assert fitter.relative(model) < 0.2 * fitter.relative_of(off)
+
+
+def test_what_a_model_lacks_is_what_its_slopes_say() -> None:
+    """The fit's own linearisation predicts what a small change of a number does."""
+    data = both(stage())
+    fitter = Trajectory.of(balanced(stage(), data), stage())
+    drag = Term({"name": "quadratic-drag", "coefficient": 2e-3}, frozenset({"coefficient"}))
+    model = fitter.fit([drag], steps=0)
+    (free,) = model.free
+    moved = list(model.terms)
+    free.put(moved, free.get(moved) + 3.0 * free.step)
+    change = fitter.residual(model.coefficients, moved) - model.residual
+    predicted = -3.0 * free.step * model.tangents[0]
+    assert np.linalg.norm(change - predicted) < 0.15 * np.linalg.norm(change)
+
+
+@pytest.mark.slow
+def test_friction_that_grows_with_the_load_is_named(loaded: list[Recording]) -> None:
+    done = diagnose(stage(), loaded, budget=200.0)
+    assert done.verdict == "missing-physics"
+    assert "load-dependent-friction" in done.effects[0].names
+    assert done.position is not None and done.position.after < 0.4 * done.position.retuned
+    assert done.to_json()["fit"]["position_error"]["after"] == done.position.after
+
+
+@pytest.mark.slow
+def test_a_pendulum_as_believed_is_left_in_peace() -> None:
+    plant = stage()
+    done = diagnose(plant, both(plant))
+    assert done.position is not None
+    assert done.verdict in ("consistent", "retuned") and not done.effects
+
+
+@pytest.mark.slow
+def test_a_measured_servo_is_predicted_at_a_gain_that_was_not_looked_at() -> None:
+    folder = Path(os.environ.get("RTCOMP_SHARED", Path(__file__).parents[3] / "shared/data"))
+    folder = folder / "real/servo-pendulum"
+    if not folder.is_dir():
+        pytest.skip(f"needs the recordings of a servo with a pendulum at {folder}")
+    columns = {"voltage": "duty", "enabled": "torque_enabled"}
+
+    def gain(number: int) -> list[Recording]:
+        files = sorted(folder.glob(f"kp{number}_*.csv"))
+        return [part for path in files for part in driven(read(path, columns, rate_hz=RATE))]
+
+    believed = Stage.load(shipped("xl330_pendulum.yaml"))
+    done = diagnose(believed, [*gain(200), *gain(400)], budget=300.0)
+    assert done.effects[0].names[0] == "load-dependent-friction"
+    windows = Windows.of(balanced(believed, gain(100)))
+    assert done.retuned_stage is not None
+    retuned, extended = (np.abs(windows.off(s)).mean() for s in (done.retuned_stage, done.stage))
+    assert extended < retuned / 1.5
