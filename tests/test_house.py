@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from rtcomp.physics import catalogue
+
 TOP = Path(__file__).resolve().parent.parent
 MODULES = sorted([*(TOP / "rtcomp").rglob("*.py"), *(TOP / "drivers" / "rtcomp_drivers").rglob("*.py")])
 LONGEST = 350
@@ -82,3 +84,16 @@ def test_no_two_test_files_have_one_name() -> None:
     """The folders of tests are no packages: pytest imports every file of theirs by its bare name."""
     names = [path.name for path in (TOP / "tests").rglob("*.py") if path.name != "conftest.py"]
     assert sorted(names) == sorted(set(names))
+
+
+def test_the_diagnosis_knows_no_effect_by_its_name() -> None:
+    """What it looks for is the catalogue's: a name in its code would be an effect treated by itself."""
+    names = {kind.name for kind in catalogue.entries()}
+    written = [
+        f"{name_of(module)}:{node.lineno}: {node.value}"
+        for module in MODULES
+        if "diagnosis" in module.parts
+        for node in ast.walk(ast.parse(module.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value in names
+    ]
+    assert written == []

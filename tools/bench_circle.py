@@ -16,8 +16,8 @@ import click
 from figures_table import Figure, show
 from rtcomp_drivers.plant_process import PlantProcess
 
+from rtcomp.circle import demonstrate as d
 from rtcomp.cli.runs import load
-from rtcomp.diagnosis import demonstrate as d
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
 from rtcomp.jobs.identify import identify

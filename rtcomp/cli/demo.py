@@ -52,7 +52,7 @@ def demo(
     """
     from rtcomp_drivers.plant_process import PlantProcess
 
-    from rtcomp.diagnosis import demonstrate as d
+    from rtcomp.circle import demonstrate as d
     from rtcomp.jobs.demo import demo as run
     from rtcomp.jobs.demo import shipped
     from rtcomp.report.circle_page import circle_rows, with_circle

@@ -114,9 +114,9 @@ class Named:
 
 @dataclass(frozen=True)
 class Fit:
-    """Relative force errors (rms over rms) on parts that were left out of the fit.
+    """Relative force errors (rms over rms) on reserved parts, which judge once.
 
-    The choice between explanations may have used these parts (`holding`).
+    They take part neither in the fit nor in the choice between explanations.
     """
 
     before: float
@@ -130,8 +130,7 @@ class Fit:
 class PositionFit:
     """Mean absolute errors of position (m) of a stage let go at points of the recording, driven as it was.
 
-    On windows of `seconds` that took part neither in the fit nor in the choice between explanations (in the
-    first diagnosis: not in the fit).
+    On windows of `seconds` that took part neither in the fit nor in the choice between explanations.
     """
 
     before: float

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from rtcomp.diagnosis.demonstrate import Circle
+from rtcomp.circle.demonstrate import Circle
 from rtcomp.report.diagnosis_words import joined, percent
 from rtcomp.report.figures.tracking import Figures, error_bars_figure, tracking_figure
 from rtcomp.report.page import Page, Row, Section

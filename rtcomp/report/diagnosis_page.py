@@ -137,8 +137,8 @@ def _gain(found: Diagnosis) -> Section:
     prose = "Relative force error: the force that the balance leaves open, rms over the rms of the force."
     if len({fit.before, fit.retuned, fit.after}) > 1:
         prose += (
-            " Measured on parts of the recordings that were left out of the fit; the choice between "
-            "explanations may have used them."
+            " Measured on parts of the recordings that took part neither in the fit nor in the choice "
+            "between explanations."
         )
     errors = {"as believed": fit.before, "retuned": fit.retuned, "extended": fit.after}
     return Section("How well it predicts", prose, fit_figure(errors, fit.floor))

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtcomp.diagnosis import demonstrate as d
+from rtcomp.circle import demonstrate as d
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.identify import identify
 from rtcomp.report.circle_page import circle_rows, judged, with_circle
