@@ -72,7 +72,7 @@ class ForceBalance(Signals):
     def put(self, reaches: Floats, step: float) -> None:
         """Put the grid of yield displacements (m) to `reaches`, in steps of `step` (logarithm)."""
         own = self.believed_reaches if self.believed_reaches.size <= MOST_OWN else np.zeros(0)
-        self.reaches = joined(own[own <= self.coarse[-1]], np.unique(reaches), step)
+        self.reaches = joined(own, np.unique(reaches), step)
         self.step = step
         self._cache = Cache()
 
@@ -249,10 +249,9 @@ class ForceBalance(Signals):
             if self._whitening is None:
                 parts.append(table[:, 3:-3])
                 continue
-            # What the ends have wrong would be drawn out over all that a filter remembers.
-            lead, rows = self._whitening.lead, self._whitening.rows(segment)
-            white = filtered(table[:, lead:-lead], self.data.rate, self._whitening.response, noisy=True)
-            parts.append(white[:, rows.start - lead : rows.stop - lead : rows.step])
+            kept, rows = self._whitening.filtered(segment), self._whitening.rows(segment)
+            white = filtered(table[:, kept], self.data.rate, self._whitening.response, noisy=True)
+            parts.append(white[:, rows.start - kept.start : rows.stop - kept.start : rows.step])
         return np.concatenate(parts, axis=1)
 
     def both_sides(self, stage: Stage) -> tuple[Floats, Floats]:
@@ -290,9 +289,9 @@ class ForceBalance(Signals):
         """Return signals (K,), one a segment, below the motion's bandwidth on the compared rows, (n,)."""
         parts = []
         for segment, s in zip(self.data.segments, signals, strict=True):
-            lead, rows = self.whitening.lead, self.whitening.rows(segment)
-            below = filtered(s[lead:-lead], self.data.rate, self.noise.wiener, noisy=True)
-            parts.append(below[rows.start - lead : rows.stop - lead : rows.step])
+            kept, rows = self.whitening.filtered(segment), self.whitening.rows(segment)
+            below = filtered(s[kept], self.data.rate, self.noise.wiener, noisy=True)
+            parts.append(below[rows.start - kept.start : rows.stop - kept.start : rows.step])
         return np.concatenate(parts)
 
     def plain(self, signals: Sequence[Floats]) -> Floats:

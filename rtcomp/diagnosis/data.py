@@ -24,8 +24,8 @@ BEFORE = 10_000
 """Rows, at most, of the way to a window."""
 RUN_IN = 0.2
 """Part of a window that is not compared."""
-FORGOTTEN = 0.25
-"""Part of the stroke after which friction has forgotten what was before: twice its longest reach."""
+FORGOTTEN = 0.95
+"""Part of the stroke after which friction has forgotten what was before: twice what may yield at all."""
 WINDOWS = 4
 """Windows of a long recording."""
 

@@ -84,7 +84,11 @@ class Whitening:
         lead = LEAD if data.held else RINGING
         return cls(response, white, thinning, lead, lead + max(1, int(2.0 * data.rate / high)))
 
+    def filtered(self, segment: Segment) -> slice:
+        """Return the rows that are filtered: what run-in or ends have wrong would be drawn out over others."""
+        return slice(max(self.lead, segment.run_in), segment.time.size - self.lead)
+
     def rows(self, segment: Segment) -> slice:
         """Return the rows of a segment that are compared."""
-        first = max(self.edge, segment.run_in)
+        first = self.edge + max(segment.run_in - self.lead, 0)
         return slice(first, max(segment.time.size - self.edge, first + 1), self.thinning)

@@ -49,10 +49,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module", params=["first", "second"])
-def diagnosed(folder: Path, request: pytest.FixtureRequest) -> dict[str, Any]:
+@pytest.fixture(scope="module")
+def diagnosed(folder: Path) -> dict[str, Any]:
     run = rtcomp("diagnose", "cogging.h5", "--stage", "stage.yaml", "--out", "out", "--force", "--json",
-                 "--method", request.param, at=folder, timeout=600)  # fmt: skip
+                 at=folder, timeout=600)  # fmt: skip
     assert (run.returncode, run.stderr) == (0, "")
     answer: dict[str, Any] = json.loads(run.stdout)
     return answer
@@ -80,12 +80,10 @@ def test_the_answer_is_the_contracts_and_the_same_in_the_folder(
         ("--budget", "0.001", ["budget of 0.001 s", "give it more"]),
         ("--budget", "0", ["0", "x>0"]),
         ("--input", "stepped", ["stepped", "held", "band-limited"]),
-        ("--method", "third", ["third", "first", "second"]),
     ],
 )
-def test_bad_options_of_the_second_method(folder: Path, option: str, value: str, says: list[str]) -> None:
-    method = [] if option == "--method" else ["--method", "second"]
-    given = ("--stage", "stage.yaml", "--out", "new", *method, option, value)
+def test_bad_options(folder: Path, option: str, value: str, says: list[str]) -> None:
+    given = ("--stage", "stage.yaml", "--out", "new", option, value)
     refused("diagnose", "stage.h5", *given, at=folder, says=says)
     assert not (folder / "new").exists()
 
@@ -98,7 +96,7 @@ def test_another_unit_is_refused_in_one_line_or_assumed_and_said(folder: Path) -
     )
     header = "time,position,reference,voltage"
     np.savetxt(folder / "ms.csv", rows, delimiter=",", header=header, comments="")
-    given = ("diagnose", "ms.csv", "--stage", "stage.yaml", "--method", "second")
+    given = ("diagnose", "ms.csv", "--stage", "stage.yaml")
     refused(*given, "--out", "ms", at=folder, says=["time in ms", "1 Hz", "--assume-units"])
     assert not (folder / "ms").exists()
     run = rtcomp(*given, "--out", "ms", "--assume-units", at=folder, timeout=600)
@@ -181,5 +179,5 @@ def test_the_place_is_shown_on_the_terminal_before_anything_is_named(folder: Pat
     shown = in_a_terminal(
         "diagnose", "cogging.h5", "--stage", "stage.yaml", "--out", "shown", "--force", at=folder
     )
-    place, rest = shown.index("Refitted, the stage leaves"), shown.index("screen")
+    place, rest = shown.index("Refitted, the stage leaves"), shown.index("search")
     assert place < shown.index("periodic in position: period 5") < rest < shown.index("Missing: cogging")
