@@ -85,7 +85,7 @@ class Whitening:
         return cls(response, white, thinning, lead, lead + max(1, int(2.0 * data.rate / high)))
 
     def filtered(self, segment: Segment) -> slice:
-        """Return the rows that are filtered: what run-in or ends have wrong would be drawn out over others."""
+        """Return the rows that are filtered: what run-in or ends have wrong would be drawn out."""
         return slice(max(self.lead, segment.run_in), segment.time.size - self.lead)
 
     def rows(self, segment: Segment) -> slice:
