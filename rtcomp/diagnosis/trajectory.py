@@ -15,7 +15,7 @@ import numpy as np
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import ForceBalance, System
-from rtcomp.diagnosis.belief import Belief, is_sized
+from rtcomp.diagnosis.belief import LEVEL, Belief, is_sized
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.data import Data
 from rtcomp.diagnosis.entries import Entry
@@ -31,9 +31,6 @@ from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place
 from rtcomp.stage.stage import Stage
 
-LEVEL, REACH = "level", "reach"
-FAR = 4.0
-"""Logarithm of the largest factor that friction is moved by, and sizes in those of the believed ones."""
 STEP = 5e-3
 """With which derivatives along the numbers of the belief are taken."""
 RELEASED = 0.3

@@ -172,6 +172,7 @@ def test_a_pendulum_as_believed_is_left_in_peace() -> None:
     done = diagnose(plant, both(plant))
     assert done.position is not None
     assert done.verdict in ("consistent", "retuned") and not done.effects
+    assert "sensor-delay" in done.not_observable
 
 
 @pytest.mark.slow
