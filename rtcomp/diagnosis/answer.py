@@ -51,7 +51,8 @@ class Rest:
             return cls(relative > TOLERANCE, 1.0 if not found.chosen.terms else error / first)
         noise = float(np.median(found.null.errors))
         share = max(error - noise, 0.0) / max(first - noise, 1e-300)
-        matters = relative > TOLERANCE and (not found.chosen.terms or math.sqrt(share) > LEAST_GAIN)
+        # Of many small things none of which could be named, the square counts: they do not add up to one.
+        matters = relative > TOLERANCE and (not found.chosen.terms or share > LEAST_GAIN)
         significant = matters and found.null.p_of_error(error) < LEVEL
         return cls(significant, min(share, 1.0))
 
