@@ -91,10 +91,6 @@ class Data:
         sources = tuple(s.source or s for s in self.segments)
         return Data(sources, self.rate * self.averaged, self.held)
 
-    def with_input(self, *, held: bool) -> Data:
-        """Return the same recordings with the command between rows taken to be held, or band-limited."""
-        return replace(self, held=held)
-
 
 def load_data(recordings: Sequence[Recording], *, held: bool = True, bandwidth: float = 0.0) -> Data:
     """Return the recordings (of one rate) as segments: without long gaps, windows of very long ones.

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rtcomp.diagnosis.data import reversals
 from rtcomp.errors import RecordingError
 from rtcomp.kernels import Floats
 from rtcomp.recording.pieces import pieces, steps
@@ -114,24 +115,6 @@ def check(recordings: Sequence[Recording]) -> list[str]:
         many = "one reversal" if total == 1 else f"{total} reversals"
         return [f"only {many}: what happens at reversals is hardly seen; ten or more are good"]
     return []
-
-
-def reversals(position: Floats) -> int:
-    """Return how often `position` (m) turns back by more than 2 % of its range."""
-    reach = 0.02 * float(np.ptp(position))
-    count, way = 0, 0
-    low = high = float(position[0])
-    for value in position[:: max(1, position.size // 20_000)].tolist():
-        low, high = min(low, value), max(high, value)
-        if way <= 0 and value > low + reach:
-            count += way < 0
-            way, high = 1, value
-            low = value
-        elif way >= 0 and value < high - reach:
-            count += way > 0
-            way, low = -1, value
-            high = value
-    return count
 
 
 def _largest(column: Floats) -> float:

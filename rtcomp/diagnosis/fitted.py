@@ -13,7 +13,7 @@ from rtcomp.diagnosis.regression import Grams, Prior
 from rtcomp.kernels import Floats
 
 ONCE = 0.5
-"""Part of a column's power in one block, from which on the other blocks cannot tell its size."""
+"""A column with more than this part of its power in one block: the other blocks do not show its size."""
 
 
 @dataclass(frozen=True)

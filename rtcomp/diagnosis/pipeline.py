@@ -37,7 +37,7 @@ SEARCH, TELL_APART = 0.75, 0.9
 """Parts of the budget at which the search ends, and what then tells its models apart."""
 BAND_LIMITED = "the command is taken as band-limited between rows, which fits better than held"
 LOUD = 0.03
-"""Relative force error of noise alone, from which on forces do not judge an axis that mostly sticks."""
+"""Relative force error of noise alone. Above it, an axis that mostly sticks is judged by its position."""
 Located = Callable[[float, Sequence[Place]], None]
 """Told, before anything is named, what part of the force the refitted stage leaves open (rms), and where."""
 

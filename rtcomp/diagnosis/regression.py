@@ -79,18 +79,3 @@ class Grams:
         g, h = self.gram[which], self.cross[which]
         found = self.power[which] - 2.0 * h @ c + np.einsum("i,kij,j->k", c, g, c)
         return np.asarray(np.maximum(found, 1e-12 * self.power[which] + 1e-300))
-
-    def left_out(self, use: np.ndarray, prior: Prior, variance: float) -> tuple[Floats, Floats]:
-        """Return squared errors (B_use,) of each block of `use` predicted by the others, and coefficients.
-
-        The coefficients, (B_use, p), are those without each block.
-        """
-        members = np.flatnonzero(use)
-        errors, found = np.empty(members.size), []
-        for i, k in enumerate(members):
-            others = use.copy()
-            others[k] = False
-            c = self.solve(others, prior, variance)
-            errors[i] = self.errors(c, np.array([k]))[0]
-            found.append(c)
-        return errors, np.array(found)

@@ -137,10 +137,6 @@ class Trajectory(Fitter):
             found.append(term.with_entry(entry))
         return found
 
-    def units(self, entries: Sequence[Entry]) -> Floats:
-        """See `Fitter`; raises NotImplementedError: nothing is linear."""
-        raise NotImplementedError("a trajectory has no columns of unit size")
-
     def change(self, model: Fitted, entry: Entry) -> Floats:
         """See `Fitter`."""
         other = self.residual(model.coefficients, [*model.terms, Term(entry, frozenset())])

@@ -1,4 +1,4 @@
-"""Parts of the second diagnosis: properties and known truths of filters, tests, entries and regression."""
+"""Parts of the diagnosis: properties and known truths of filters, tests, entries and regression."""
 
 from __future__ import annotations
 

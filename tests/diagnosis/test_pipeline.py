@@ -1,4 +1,4 @@
-"""The second diagnosis from recording to answer, on simulated axes with a concealed effect."""
+"""The diagnosis from recording to answer, on simulated axes with a concealed effect."""
 
 from __future__ import annotations
 
