@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.cache import Cache, Group
+from rtcomp.diagnosis.cache import KEPT_ONCE, Cache, Group
 from rtcomp.diagnosis.data import Data, Segment, reversals
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.noise import Noise, Whitening
@@ -83,6 +83,7 @@ class ForceBalance(Signals):
         other._whitening, other.blocks, other.block = self._whitening, self.blocks, self.block
         other._reserved = self._reserved
         other.believed_speed = self.believed_speed
+        other._cache = Cache(KEPT_ONCE)
         return other
 
     @property
@@ -93,8 +94,8 @@ class ForceBalance(Signals):
     def _needed(self, segment: Segment, c: Floats) -> Floats:
         """Return the force (N, (K,)) that a segment's motion needs, of coefficients `c` of the belief."""
         path = self._path(segment, [], smooth=False)
-        units = self._units(self.stage, segment, path, [], [], None)
-        force = path.measured * c[0] + units @ np.concatenate([c[1 : len(BASE)], c[self.friction]])
+        units = self._units(segment, path, [], [], None)
+        force = path.measured * c[0] + units @ c[1 : self.friction.stop]
         made = [ent.build(one) for e in self.believed for one in ent.basis(e)]
         for effect, size in zip(made, c[self.size :], strict=True):
             force += size * self._force_of(effect, segment, path)

@@ -1,9 +1,9 @@
 """Friction as columns: what each unit of the base does along a motion, with what changes friction at work.
 
-Units are viscous friction and micro-damping of size 1, and a stop element of 1 N/m for each reach. All go
-along the motion in one pass, the elements by the law of the catalogue's and not by a call of it for each.
-What depends on the whole of friction (its level, how far it is along its branch) is given that of the
-friction at hand, of which the units are parts: it stays linear.
+Units are viscous friction and micro-damping of size 1, the derivative of that by the logarithm of its speed,
+and a stop element of 1 N/m for each reach. All go along the motion in one pass, the elements by the law of
+the catalogue's and not by a call of it for each. What depends on the whole of friction (its level, how far it
+is along its branch) is given that of the friction at hand, of which the units are parts: it stays linear.
 """
 
 from __future__ import annotations
@@ -34,8 +34,10 @@ from rtcomp.physics.wires import (
 from rtcomp.stage.balance import along_row, around_rows, parts_of
 from rtcomp.stage.stage import Stage
 
-SPEED_UNITS = 2
-"""Units before the stop elements: viscous friction, micro-damping."""
+SPEED_UNITS = 3
+"""Units before the stop elements: viscous friction, micro-damping, its derivative."""
+FASTER = 0.02
+"""Relative change of the speed of micro-damping to which its damping is looked at."""
 MORE = 1e-4
 """Part of the level that an element is made larger by, to see what it does to bent branches."""
 
@@ -51,16 +53,18 @@ def units_along(
     start: Floats | None = None,
     least_parts: int = 1,
 ) -> Floats:
-    """Return the force (N) of each unit around the rows of a motion, (K, 2 + reaches).
+    """Return the force (N) of each unit around the rows of a motion, (K, 3 + reaches).
 
     `motion` is (K, 5): time (s), position (m), velocity, acceleration, the command held up to each row (V);
     `weights` (N/m) of the stop elements make the friction at hand; `start` (m) are their deflections before
     the motion, nothing where it is not given. `drive` effects only tell the load. A row is cut into
     `least_parts`, or more where an effect needs it.
     """
+    below = stage.mechanics.micro_damping_speed
     units: list[Effect] = [
         ViscousFriction(coefficient=1.0),
-        MicroDamping(coefficient=1.0, speed=stage.mechanics.micro_damping_speed),
+        MicroDamping(coefficient=1.0, speed=below),
+        MicroDamping(coefficient=1.0, speed=(1.0 + FASTER) * below),
     ]
     models = MaxwellSlip.order
     chain = sorted(modifiers, key=lambda e: e.order)
@@ -84,6 +88,8 @@ def units_along(
         program.steps, program.p, program.s, w, base, motion, parts, len(before), len(bent), weights, reaches,
         deflection, out, mean,
     )  # fmt: skip
+    for table in (out, mean):
+        table[:, 2] = (table[:, 2] - table[:, 1]) / np.log1p(FASTER)
     if parts > needed == 1:  # damping is smooth between rows
         mean[:, :SPEED_UNITS] = around_rows(out[:, :SPEED_UNITS])
     return around_rows(out) if parts == 1 else mean

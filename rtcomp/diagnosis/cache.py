@@ -11,8 +11,8 @@ import numpy as np
 
 from rtcomp.kernels import Floats
 
-KEPT = 3 * 10**8
-"""Bytes of columns that are kept for the next evaluation."""
+KEPT, KEPT_ONCE = 2 * 10**8, 3 * 10**7
+"""Bytes of columns that are kept for the next evaluation; those of a replicate, which is fitted once."""
 
 
 class Cache:

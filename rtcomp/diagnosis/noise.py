@@ -59,6 +59,8 @@ class Whitening:
     response: Response
     white: Response
     """The first of its two factors: one over the amplitude density of noise in the residual."""
+    coloured: Response
+    """The inverse of that."""
     thinning: int
     lead: int
     """Rows at both ends of a segment whose derivatives are not right: cut before filtering."""
@@ -73,6 +75,7 @@ class Whitening:
         and multiplied by the share of the position that is signal.
         """
         frequency, density = spectrum(shaken, data.rate)
+        coloured = interpolated(frequency, np.sqrt(density * 0.5 * data.rate))
         white = interpolated(frequency, 1.0 / np.sqrt(density * 0.5 * data.rate))
 
         def response(at: Floats) -> Floats:
@@ -82,7 +85,7 @@ class Whitening:
         high = float(frequency[above[-1]]) if above.size else float(frequency[-1])
         thinning = max(1, int(data.rate / (2.5 * high)))
         lead = LEAD if data.held else RINGING
-        return cls(response, white, thinning, lead, lead + max(1, int(2.0 * data.rate / high)))
+        return cls(response, white, coloured, thinning, lead, lead + max(1, int(2.0 * data.rate / high)))
 
     def filtered(self, segment: Segment) -> slice:
         """Return the rows that are filtered: what run-in or ends have wrong would be drawn out."""

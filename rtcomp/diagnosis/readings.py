@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rtcomp.diagnosis.bank import units_along
+from rtcomp.diagnosis.bank import SPEED_UNITS, units_along
 from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.spectrum import filtered
@@ -167,7 +167,8 @@ def moving_mass(stage: Stage, recording: Recording) -> float | None:
         motion = np.ascontiguousarray(np.column_stack([s.time, x, v, a, held]))
         units = units_along(stage, [], [], reaches, np.zeros(STOPS), motion, 0.0)
         mean = 0.5 * (held + np.append(held[1:], held[-1:])) * stage.force_constant
-        table = np.column_stack([a, units[:, :1], units[:, 2:], around_rows(x), np.ones(x.size), mean])
+        friction = [units[:, :1], units[:, SPEED_UNITS:]]
+        table = np.column_stack([a, *friction, around_rows(x), np.ones(x.size), mean])
         low_passed = filtered(np.ascontiguousarray(table.T), data.rate, noise.wiener, noisy=True)
         edge = min(100, x.size // 10)
         columns.append(low_passed[:-1, edge:-edge])

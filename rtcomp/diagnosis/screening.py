@@ -35,21 +35,20 @@ class Screen:
             return
         self._use = np.flatnonzero(use).tolist()
         self._edges = list(pairwise(np.searchsorted(block, np.arange(count + 1)).tolist()))
-        columns = np.concatenate([c.columns for c in found])
-        norm = np.sqrt(np.einsum("ij,ij->i", columns, columns))
+        self._columns = np.concatenate([*(c.columns for c in found), np.zeros((1, block.size))])
+        norm = np.sqrt(np.einsum("ij,ij->i", self._columns, self._columns))
         scale = np.where(norm > 0.0, norm, 1.0)
-        columns /= scale[:, None]
+        self._columns /= scale[:, None]
         self._sizes = [c.columns.shape[0] for c in found]
         starts = np.cumsum([0, *self._sizes[:-1]])
-        nothing, most = columns.shape[0], max(self._sizes)
+        nothing, most = scale.size - 1, max(self._sizes)
         self._index = np.full((len(found), most), nothing)
         for row, start, size in zip(self._index, starts.tolist(), self._sizes, strict=True):
             row[:size] = np.arange(start, start + size)
-        self._scale = np.append(scale, 1.0)[self._index]
+        self._scale = scale[self._index]
         self._low = np.append(np.concatenate([c.low for c in found]), 0.0)[self._index] * self._scale
         self._high = np.append(np.concatenate([c.high for c in found]), 0.0)[self._index] * self._scale
         self._filled = np.eye(most) * (self._index == nothing)[:, None, :]
-        self._columns = np.concatenate([columns, np.zeros((1, columns.shape[1]))])
         self._own = [self._products(k) for k in self._use]
         power = np.array([np.einsum("cqq->cq", own) for own in self._own])
         self._once = np.any(power > ONCE * np.maximum(power.sum(axis=0), 1e-300), axis=2)

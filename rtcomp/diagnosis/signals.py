@@ -29,8 +29,6 @@ from rtcomp.stage.stage import Stage
 BASE = ("mass", "viscous", "micro_damping")
 """Numbers whose columns come first. After them that of the speed of micro-damping, to first order, then
 those of the friction units, and a constant force."""
-FASTER = 0.02
-"""Relative change of the speed of micro-damping to which its damping is looked at."""
 FURTHEST = 0.3
 """Largest change of its logarithm that is taken from one fit."""
 PARTS = 2
@@ -175,7 +173,7 @@ class Signals:
         adding: Sequence[Effect],
         weights: Floats | None,
     ) -> tuple[list[Group], Group | None]:
-        """Return the base's columns (mass; damping; its speed; friction units; a constant force), the load's.
+        """Return the base's columns (mass; units of damping and friction; a constant force), the load's.
 
         The last is how much the friction at hand changes with the command, relative to it.
         """
@@ -206,9 +204,7 @@ class Signals:
                 found.append(a)
             return found
 
-        def units(
-            more: float = 0.0, some: np.ndarray | None = None, stage: Stage = self.stage
-        ) -> list[Floats]:
+        def units(more: float = 0.0, some: np.ndarray | None = None) -> list[Floats]:
             found = []
             for k, (s, p) in enumerate(zip(self.data.segments, self.paths(sensors), strict=True)):
                 path = p
@@ -218,37 +214,26 @@ class Signals:
                     path = Path(y, v, _second_difference(y, self.data.rate), p.measured)
                 pushed = replace(s, voltage=(1.0 + more) * s.voltage) if more else s
                 at_hand = weights if whole else None
-                found.append(self._units(stage, pushed, path, before, modifiers, at_hand, some))
+                found.append(self._units(pushed, path, before, modifiers, at_hand, some))
             return found
 
-        def damping() -> list[Floats]:
-            present = held != 0.0 if whole else np.zeros(held.size, dtype=np.bool_)
-            pairs = zip(units(some=present), units(some=present, stage=self._damping_below()), strict=True)
-            last = SPEED_UNITS - 1
-            return [
-                np.column_stack([now[:, :SPEED_UNITS], (then[:, last] - now[:, last]) / np.log1p(FASTER)])
-                for now, then in pairs
-            ]
-
-        def friction(more: float = 0.0) -> list[Floats]:
-            return [table[:, SPEED_UNITS:] for table in units(more)]
-
         def of_sizes(sizes: Floats) -> list[Floats]:
-            some = sizes != 0.0
+            some = sizes[SPEED_UNITS:] != 0.0
             if whole:
                 some |= held != 0.0
-            return [table[:, SPEED_UNITS:] @ sizes[some] for table in units(some=some)]
+            these = np.concatenate([sizes[:SPEED_UNITS], sizes[SPEED_UNITS:][some]])
+            return [table @ these for table in units(some=some)]
 
         def by_load() -> list[Floats]:
-            pairs = zip(friction(MORE), friction(), strict=True)
-            return [(more - plain) @ held / MORE for more, plain in pairs]
+            pairs = zip(units(MORE), units(), strict=True)
+            return [(more - plain)[:, SPEED_UNITS:] @ held / MORE for more, plain in pairs]
 
         held = self.weights if weights is None else weights
+        speed = self.stage.mechanics.micro_damping_speed
         key = (key_of(before), key_of(modifiers), key_of(sensors), behind, own)
         columns = [
             Group(("mass", key_of(hung), key_of(sensors), behind), mass),
-            Group(("damping", self.stage.mechanics.micro_damping_speed, *key), damping),
-            Group(("friction", *key), friction, of_sizes, self.reaches.size),
+            Group(("units", speed, *key), units, of_sizes, SPEED_UNITS + self.reaches.size),
             Group(("offset",), lambda: [np.ones(s.time.size) for s in self.data.segments]),
         ]
         return columns, Group(("by load", held.tobytes(), *key), by_load) if before else None
@@ -273,13 +258,8 @@ class Signals:
             found[at] += k * r / self.reaches[at]
         return found
 
-    def _damping_below(self) -> Stage:
-        speed = (1.0 + FASTER) * self.stage.mechanics.micro_damping_speed
-        return self.stage.with_changes(stage={"micro_damping_speed": speed})
-
     def _units(
         self,
-        stage: Stage,
         segment: Segment,
         path: Path,
         before: Sequence[Effect],
@@ -294,7 +274,7 @@ class Signals:
         if some is not None:
             held, reaches, start = held[some], reaches[some], start[some]
         return units_along(
-            stage, list(before), list(modifiers), reaches, held, np.ascontiguousarray(motion),
+            self.stage, list(before), list(modifiers), reaches, held, np.ascontiguousarray(motion),
             self.grain, start, PARTS,
         )  # fmt: skip
 

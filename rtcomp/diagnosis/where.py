@@ -66,7 +66,7 @@ class Compared:
 
 def as_force(balance: ForceBalance, residual: Floats) -> Floats:
     """Return a whitened residual (n,) as a force (N): its spectrum coloured again."""
-    return _weighed(balance, residual, lambda frequency: np.asarray(1.0 / balance.whitening.white(frequency)))
+    return _weighed(balance, residual, balance.whitening.coloured)
 
 
 def as_white(balance: ForceBalance, force: Floats) -> Floats:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import math
+import weakref
 from typing import Any
 
 import numpy as np
@@ -26,6 +28,7 @@ from rtcomp.diagnosis.significance import Null, confidence_set, log_gain, probab
 from rtcomp.diagnosis.spectrum import filtered, spectrum
 from rtcomp.diagnosis.stage_of import stage_of
 from rtcomp.diagnosis.validation import Reserved
+from rtcomp.diagnosis.where import as_force
 from rtcomp.errors import RecordingError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, catalogue
@@ -186,13 +189,13 @@ def test_friction_remembers_the_way_to_a_window() -> None:
     windows, (everything,) = balance.data.segments, load_data([cut(whole, 0, 64_000)]).segments
     assert len(windows) > 1 and everything.before is None
     path = balance._path(everything, [])
-    along = balance._units(balance.stage, everything, path, [], [], None)
+    along = balance._units(everything, path, [], [], None)
     inside = [w for w in windows[1:] if w.time[-1] < everything.time[-1]]
     assert inside
     for window in inside:
         first = round(float(window.time[0]) * 1000.0)
         part = path.part(slice(first, first + window.time.size))
-        units = balance._units(balance.stage, window, part, [], [], None)
+        units = balance._units(window, part, [], [], None)
         stops = slice(2 + balance.reaches.size // 2, None)  # short ones forget the way at once
         assert units[10:-10, stops] == pytest.approx(
             along[first + 10 : first + window.time.size - 10, stops], abs=0.02 * float(balance.reaches[-1])
@@ -237,6 +240,17 @@ def test_a_fit_is_blind_to_reserved_rows() -> None:
     found = grams.solve(fitter.use, fitted.prior, fitted.variance)
     assert found == pytest.approx(fitted.coefficients, rel=0.05, abs=1.0)
     assert grams.errors(found, fitter.use).sum() == pytest.approx(fitted.sse, rel=1e-3)
+
+
+def test_what_was_made_of_a_recording_goes_with_it() -> None:
+    believed = stage()
+    balance = ForceBalance(believed, load_data([run(believed, there_and_back(5.0))]))
+    fitted = baseline(balance)
+    gone = weakref.ref(balance)
+    as_force(balance, fitted.residual)
+    del balance, fitted
+    gc.collect()
+    assert gone() is None
 
 
 def test_a_stage_of_a_fit_is_the_belief_where_nothing_is_missing() -> None:
