@@ -22,7 +22,7 @@ from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
 from rtcomp.diagnosis.retuned import Numbers, all_by_one_factor, force_constant, retunings
 from rtcomp.diagnosis.selection import Search
-from rtcomp.diagnosis.settings import LEAST_GAIN, LEFT, LEVEL, TOLERANCE
+from rtcomp.diagnosis.settings import LEAST_GAIN, LEVEL, TOLERANCE
 from rtcomp.diagnosis.stage_of import with_forces
 from rtcomp.diagnosis.validation import Reserved
 from rtcomp.diagnosis.where import Compared, curves
@@ -71,10 +71,9 @@ def answer(
     balance, base, chosen = fitter.balance, found.baseline, found.chosen
     rest = Rest.of(fitter, found)
     spans = told(fitter, chosen)
-    nearest = rest.significant and rest.share > LEFT
-    notes = _notes(balance, found, nearest)
+    notes = _notes(balance, found)
     shares = _shares(base, chosen, sets)
-    named = [] if nearest else _named(fitter, chosen, spans, sets, shares, rest)
+    named = _named(fitter, chosen, spans, sets, shares, rest)
     final = chosen if named else base
     view = Compared(balance)
     before, after = fitter.force(base), fitter.force(final)
@@ -205,13 +204,11 @@ def _verdict(
     return ("retuned", True) if matters else ("consistent", False)
 
 
-def _notes(balance: ForceBalance, found: Search, nearest: bool) -> list[str]:
+def _notes(balance: ForceBalance, found: Search) -> list[str]:
     notes = [f"frequencies count by signal to noise, up to {balance.noise.bandwidth:.3g} Hz", *found.dropped]
     names = ent.names(found.chosen.entries)
-    if nearest and names:
-        notes.append(f"nearest, but too much is left: {', '.join(names)}")
     (low, high), unit = prefixed(for_axis("m", balance.stage.axis), *balance.data.stroke)
-    if names and not nearest:
+    if names:
         notes.append(f"known from {low} to {high} {unit}, where this motion went, and not beyond")
     return notes
 

@@ -7,22 +7,23 @@ problem linearised there, with all parameters refitted.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import BASE, ForceBalance, System
+from rtcomp.diagnosis.believed import prior_of
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.data import Data
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitted import Fitted, left_out
 from rtcomp.diagnosis.free import Free, Term, free_of
+from rtcomp.diagnosis.other_forms import other_forms
 from rtcomp.diagnosis.regression import Grams, Prior
 from rtcomp.diagnosis.result import PositionFit
 from rtcomp.diagnosis.retuned import level_and_reach
-from rtcomp.diagnosis.settings import BELIEF_SD
 from rtcomp.diagnosis.stage_of import stage_of
 from rtcomp.diagnosis.where import as_force
 from rtcomp.errors import ConfigError
@@ -32,10 +33,10 @@ from rtcomp.stage.stage import Stage
 
 STEPS = 10
 """Gauss-Newton steps at most."""
-FURTHEST = 5.0
-"""Prior standard deviations from its believed size within which an effect may always be."""
 SETTLED = 1e-4
 """Relative gain of a step below which the fit ends."""
+CONSISTENT, TURNS = 0.02, 6
+"""Part of its level by which friction may be away from that which its columns were made for; turns to it."""
 
 
 class Fitter:
@@ -112,6 +113,13 @@ class Fitter:
         c = np.delete(model.coefficients, np.arange(span.start, span.stop))
         return as_force(b, b.error(others, c, model.weights))
 
+    def other_forms(self, model: Fitted) -> Floats:
+        """Return the columns (q, n) of what other forms of a model's effects would do beside it."""
+        left = self.force(model)
+        forces = [self.without(model, i) - left for i in range(len(model.terms))]
+        pairs = zip(model.entries, forces, strict=True)
+        return np.concatenate([np.zeros((0, left.size)), *(other_forms(self.balance, *p) for p in pairs)])
+
     def relative(self, model: Fitted) -> float:
         """Return what a model leaves over what there is to explain, rms of both, without the reserved."""
         rows = ~self.balance.reserved[self.balance.block]
@@ -168,50 +176,13 @@ class Fitter:
         other.offset = self.offset
         return other
 
-    def prior(self, system: System, terms: Sequence[Term]) -> Prior:
-        """Return what is believed of the columns: mass, damping near the belief, no negative stiffness."""
-        balance, m = self.balance, self.balance.stage.mechanics
-        size = system.columns.shape[0]
-        mean, precision = np.zeros(size), np.zeros(size)
-        low, high = np.full(size, -np.inf), np.full(size, np.inf)
-        low[: balance.size] = 0.0
-        for i, value in enumerate((m.mass, m.viscous, m.micro_damping)):
-            if value > 0.0:
-                mean[i], precision[i] = value, (BELIEF_SD * value) ** -2
-            elif balance.without(BASE[i]):
-                high[i] = 0.0
-        low[0] = 1e-3 * m.mass
-        if balance.believed_speed is None:
-            high[balance.faster] = 0.0
-        else:
-            off = math.log(balance.believed_speed / m.micro_damping_speed)
-            mean[balance.faster], low[balance.faster] = m.micro_damping * off, -np.inf
-            precision[balance.faster] = (BELIEF_SD * m.micro_damping) ** -2
-        if self.offset and not balance.biased and not any(ent.kind_of(t.entry).bias for t in terms):
-            low[balance.size - 1] = -np.inf
-        else:
-            high[balance.size - 1] = 0.0
-        for term, span in zip([*self._believed, *terms], system.of_entry, strict=True):
-            if span.stop > span.start:
-                low[span], high[span] = ent.bounds_of(term.entry)
-        for term, span in zip(self._believed, system.of_entry, strict=False):
-            sizes = ent.sizes_of(term.entry)
-            # What is believed is possible, on whichever side of nothing a search would look for it.
-            wide = FURTHEST * BELIEF_SD * np.abs(sizes)
-            low[span], high[span] = np.minimum(low[span], sizes - wide), np.maximum(high[span], sizes + wide)
-            near = sizes != 0.0
-            where = np.arange(span.start, span.stop)
-            mean[where[near]] = sizes[near]
-            precision[where[near]] = (BELIEF_SD * np.abs(sizes[near])) ** -2
-        return Prior(mean, precision, low, high)
-
     def solve(
         self, terms: Sequence[Term], weights: Floats, variance: float
     ) -> tuple[System, Prior, Grams, Floats, float]:
         """Return the system of `terms`, its prior, statistics, coefficients and squared error in sample."""
         b = self.balance
         system = b.system([t.entry for t in terms], weights)
-        prior = self.prior(system, terms)
+        prior = prior_of(b, [*self._believed, *terms], system, offset=self.offset)
         grams = Grams.of(system.columns, system.y, b.block, b.blocks)
         c = grams.solve(self.use, prior, variance)
         return system, prior, grams, c, float(grams.errors(c, self.use).sum())
@@ -234,7 +205,8 @@ class Fitter:
         rows = np.isin(b.block, np.flatnonzero(self.use))
         variance = 1.0 if start is None else start.variance
         for _ in range(2):
-            system, prior, _, c, sse = self.solve(current, weights, variance)
+            made_for = weights
+            system, prior, _, c, sse = self.solve(current, made_for, variance)
             variance = sse / max(int(rows.sum()), 1)
             weights = c[b.friction]
         free = free_of(current, b)
@@ -264,7 +236,7 @@ class Fitter:
             if not improved:
                 break
             gained = 1.0 - found[-1] / sse
-            current = trial
+            current, made_for = trial, weights
             system, prior, _grams, c, sse = found
             weights = c[b.friction]
             variance = sse / max(int(rows.sum()), 1)
@@ -272,7 +244,30 @@ class Fitter:
             free = free_of(current, b)
             if gained < SETTLED:
                 break
-        return self._finished(current, free, system, prior, c, sse, variance, weights)
+        by_level = any(ent.kind_of(t.entry).whole_friction for t in current)
+        for _ in range(TURNS if by_level else 0):
+            if self._consistent(made_for, weights):
+                break
+            made_for = weights
+            system, prior, _, c, sse = self.solve(current, made_for, variance)
+            weights = c[b.friction]
+        done = self._finished(current, free, system, prior, c, sse, variance, weights)
+        return self._as_it_is(done) if by_level and not self._consistent(made_for, weights) else done
+
+    def _consistent(self, made_for: Floats, weights: Floats) -> bool:
+        """Tell whether friction is that which its columns were made for, within a part of its level."""
+        off, level = (float(w @ self.balance.reaches) for w in (np.abs(weights - made_for), weights))
+        return off <= CONSISTENT * max(level, 1e-300)
+
+    def _as_it_is(self, model: Fitted) -> Fitted:
+        """Return a model with the error of its own friction, where its columns were made for another.
+
+        What depends on the level of friction, as friction by load, else explains by a level of its own.
+        """
+        true = self.balance.error(model.entries, model.coefficients, model.weights)
+        sse = float(np.sum(true[self.rows] ** 2))
+        worse = max(sse / max(model.sse, 1e-300), 1.0)
+        return replace(model, residual=true, sse=worse * model.sse, errors=worse * model.errors)
 
     def _finished(
         self,

@@ -10,24 +10,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.acceptance import accepted, doubts, exhausted, pruned, score
 from rtcomp.diagnosis.baseline import settle
-from rtcomp.diagnosis.candidates import Candidate, candidates, started
-from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.candidates import Candidate, candidates
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
-from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.intervals import told
+from rtcomp.diagnosis.growing import grow
 from rtcomp.diagnosis.replicates import best, free_columns, null_of
 from rtcomp.diagnosis.screening import Screen, Screened
-from rtcomp.diagnosis.settings import BEAM, FULL_FITS, LEAST_GAIN, LEVEL, MOST_EFFECTS, NEGLIGIBLE
-from rtcomp.diagnosis.significance import Null, log_gain
-from rtcomp.errors import ConfigError
+from rtcomp.diagnosis.settings import BEAM, LEAST_GAIN, LEVEL, MOST_EFFECTS
+from rtcomp.diagnosis.significance import Null
 
-SCANNED = 14
-"""Values of a length that are tried where first order is no guide."""
-
-PLAINER = 1e-3
-"""Logarithm of the error that one parameter more must gain to count at all."""
 NEAR = 1.0
 """Logarithm of the error over the best one's, up to which a model is kept as an alternative."""
 
@@ -70,9 +63,10 @@ def search(
     all candidates beside the baseline, where there was one.
     """
     found = Search(baseline, baseline)
-    everything = float(baseline.errors.sum())
+    everything, short = float(baseline.errors.sum()), False
     beam, parents = [baseline], {id(baseline): math.inf}
     grown: list[Fitted] = []
+    passed: list[Fitted] = []
     for step in range(MOST_EFFECTS + 1):
         judged = None
         while beam and judged is None:
@@ -85,18 +79,22 @@ def search(
         if judged is None or judged.null is None:
             break
         null = judged.null
+        before = (found.chosen, found.null, found.beside, found.alternatives)
         found.chosen, found.null, found.beside = beam[0], null, judged.candidates or None
         found.alternatives = [g for g in grown if len(g.terms) == len(beam[0].terms) and g is not beam[0]]
         if step == 0:
             found.screened = _table(judged.candidates, judged.screened, null)
         done = null.settled(judged.gain, float(beam[0].errors.sum()), LEVEL)
-        if done or step == MOST_EFFECTS or _exhausted(fitter, beam[0], everything):
+        if done or step == MOST_EFFECTS or exhausted(fitter, beam[0], everything):
             break
         if time.monotonic() > ends:
-            found.not_tried.append(_further(found.chosen))
+            if short:  # of a step that was cut, only a model that leaves nothing is sure
+                found.chosen, found.null, found.beside, found.alternatives = before
+            else:
+                found.not_tried.append(_further(found.chosen))
             break
         began = time.monotonic()
-        grown = _grow(fitter, beam[0], judged.candidates, judged.screened, ends)
+        grown = grow(fitter, beam[0], judged.candidates, judged.screened, ends)
         short = time.monotonic() > ends
         for other in beam[1:] if null.p_value(judged.gain) < LEVEL else []:
             # Another is begun only where one that takes as long would end in time.
@@ -106,22 +104,25 @@ def search(
                 break
             began = moment
             beside = look(fitter, other)
-            grown += _grow(fitter, other, beside.candidates, beside.screened, ends)
+            grown += grow(fitter, other, beside.candidates, beside.screened, ends)
         if short:
             found.not_tried.append(f"some of {_further(found.chosen)}")
-        accepted = [g for g in grown if _accepted(fitter, g, _parent(g, beam), null, everything)]
-        accepted = _distinct(sorted(accepted, key=_score))[:BEAM]
+        fit = [g for g in grown if accepted(fitter, g, _parent(g, beam), null, everything)]
+        good = _distinct(sorted(fit, key=score))[:BEAM]
         parents = {}
         next_beam = []
-        for model in accepted:
-            smaller = _pruned(fitter, model, null, everything, ends)
+        for model in good:
+            smaller = pruned(fitter, model, passed, null, everything, ends)
             parents[id(smaller)] = float(_parent(model, beam).errors.sum())
             next_beam.append(smaller)
-        beam = [m for m in _distinct(sorted(next_beam, key=_score)) if _score(m) < _score(found.chosen)]
+        passed += good
+        # What is larger must beat the best of the smaller ones, not only that which it grew from.
+        larger = _distinct(sorted(next_beam, key=score))
+        beam = [m for m in larger if accepted(fitter, m, found.chosen, null, everything)]
         if not beam:
             break
         if time.monotonic() < ends:
-            beam, grown = _resettled(fitter, found, beam, grown, parents)
+            beam, grown = _resettled(fitter, found, beam, grown, parents, ends)
             everything = float(found.baseline.errors.sum())
         if doubted is not None and doubted(beam[0]):
             found.doubted = True
@@ -137,7 +138,7 @@ def _further(model: Fitted) -> str:
 def _solid(fitter: Fitter, found: Search) -> None:
     """Leave out effects that are no finding, and refit the others."""
     while found.chosen.terms:
-        weak = [(i, why) for i, why in enumerate(doubts(fitter, found)) if why]
+        weak = [(i, why) for i, why in enumerate(doubts(fitter, found.chosen, found.null)) if why]
         if not weak:
             return
         at, why = weak[-1]
@@ -146,40 +147,30 @@ def _solid(fitter: Fitter, found: Search) -> None:
         found.chosen, found.alternatives, found.beside = fitter.fit(kept, found.chosen), [], None
 
 
-def doubts(fitter: Fitter, found: Search) -> list[str]:
-    """Return why each effect of the chosen model is no finding, "" where it is one.
-
-    Its size may be nothing, a number of it is at a physical bound, or more is left than it explains: what
-    else makes the rest makes that part as well, more likely than not.
-    """
-    chosen, null = found.chosen, found.null
-    said = []
-    for i, span in enumerate(told(fitter, chosen)):
-        why = "its size may be nothing" if span.nothing else ""
-        why = f"{', '.join(span.bound)} at its bound" if span.bound else why
-        if not why and null is not None and null.p_of_error(float(chosen.errors.sum())) < LEVEL:
-            without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
-            left = fitter.above_noise(chosen) ** 2
-            explained = fitter.above_noise(without) ** 2 - left
-            why = "more is left than it explains" if left > explained else ""
-        said.append(why)
-    return said
-
-
 def _resettled(
-    fitter: Fitter, found: Search, beam: list[Fitted], grown: list[Fitted], parents: dict[int, float]
+    fitter: Fitter,
+    found: Search,
+    beam: list[Fitted],
+    grown: list[Fitted],
+    parents: dict[int, float],
+    ends: float,
 ) -> tuple[list[Fitted], list[Fitted]]:
     """Refit all on yield displacements that suit the best model: those of a poorer one were bent to it.
 
-    Of the models that were `grown`, those that come near the best.
+    Of the models that were `grown`, those that come near the best. Its own numbers were bent as well, so both
+    are settled in turn, as long as the error falls.
     """
-    settle(fitter, beam[0].terms)
+    best, left = beam[0], math.inf
+    while best.sse < (1.0 - LEAST_GAIN) ** 2 * left and time.monotonic() < ends:
+        left = best.sse
+        settle(fitter, best.terms)
+        best = fitter.fit(best.terms, best)
     found.baseline = fitter.fit([])
-    again = [fitter.fit(m.terms, m) for m in beam]
+    again = [best, *(fitter.fit(m.terms, m) for m in beam[1:])]
     parents.update({id(new): parents[id(old)] for new, old in zip(again, beam, strict=True)})
-    near = [g for g in sorted(grown, key=_score) if all(g is not m for m in beam)]
-    near = [g for g in near if _score(g) < _score(beam[0]) + NEAR][:BEAM]
-    return sorted(again, key=_score), [*again, *(fitter.fit(g.terms, g) for g in near)]
+    near = [g for g in sorted(grown, key=score) if all(g is not m for m in beam)]
+    near = [g for g in near if score(g) < score(beam[0]) + NEAR][:BEAM]
+    return sorted(again, key=score), [*again, *(fitter.fit(g.terms, g) for g in near)]
 
 
 @dataclass(frozen=True)
@@ -231,91 +222,9 @@ def _sound(seen: Look, parent: float) -> Look | None:
     return seen
 
 
-def _grow(
-    fitter: Fitter, model: Fitted, made: Sequence[Candidate], screened: Sequence[Screened], ends: float
-) -> list[Fitted]:
-    """Return the model with each of the best candidates, fitted in full."""
-    order = best([c.family for c in made], [s.gain for s in screened], len(made))
-    terms = fitter.rough(model, [started(made[i], screened[i].sizes) for i in order], FULL_FITS, ends)
-    # First order is no guide to what is behind a play: its own motion is followed from place to place.
-    behind = {c.name: c.term for c in made if fitter.gridded and ent.kind_of(c.term.entry).behind}
-    terms = [t for t in terms if t.entry["name"] not in behind]
-    terms += [t for t in (_scanned(fitter, model, term, ends) for term in behind.values()) if t is not None]
-
-    def fit(term: Term) -> Fitted | None:
-        if time.monotonic() > ends:
-            return None
-        try:
-            return fitter.fit([*model.terms, term], model)
-        except (ConfigError, np.linalg.LinAlgError):
-            return None
-
-    return [f for f in shared(fit, terms) if f is not None]
-
-
-def _scanned(fitter: Fitter, model: Fitted, term: Term, ends: float) -> Term | None:
-    """Return the term at the length at which a model with it fits best; None where none fits better."""
-    name = next(p.name for p in ent.free_parameters(term.entry, linear=False) if p.unit == "m")
-    low, high = fitter.balance.data.stroke
-    grid = np.geomspace(2.0 * fitter.balance.grain, 0.25 * (high - low), SCANNED)
-
-    def error(value: float) -> float:
-        if time.monotonic() > ends:
-            return np.inf
-        entry = {**term.entry, name: value}
-        try:
-            return fitter.quick([*model.terms, term.with_entry(entry)])
-        except (ConfigError, np.linalg.LinAlgError):
-            return np.inf
-
-    for _ in range(2):
-        errors = shared(error, grid.tolist())
-        at = int(np.argmin(errors))
-        if errors[at] >= model.sse:
-            return None
-        value = float(grid[at])
-        grid = np.geomspace(grid[max(at - 1, 0)], grid[min(at + 1, grid.size - 1)], SCANNED // 2)
-    return term.with_entry({**term.entry, name: value})
-
-
-def _accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, everything: float) -> bool:
-    """Tell whether the last effect of a model passes the one test and matters."""
-    if null is None or model.at_bound:
-        return False
-    p = null.p_value(log_gain(parent.errors, model.errors))
-    gained = math.sqrt(parent.errors.sum()) - math.sqrt(model.errors.sum())
-    if p >= LEVEL or gained <= LEAST_GAIN * math.sqrt(everything):
-        return False
-    return fitter.relative(parent) ** 2 - fitter.relative(model) ** 2 > NEGLIGIBLE**2
-
-
-def _exhausted(fitter: Fitter, model: Fitted, everything: float) -> bool:
-    """Tell whether a model leaves too little for any further effect to matter."""
-    little = math.sqrt(model.errors.sum()) <= LEAST_GAIN * math.sqrt(everything)
-    return little or fitter.relative(model) <= NEGLIGIBLE
-
-
 def _parent(model: Fitted, beam: Sequence[Fitted]) -> Fitted:
     names = ent.names(model.entries)[:-1]
     return next(b for b in beam if ent.names(b.entries) == names)
-
-
-def _pruned(fitter: Fitter, model: Fitted, null: Null | None, everything: float, ends: float) -> Fitted:
-    """Return the model without effects that no longer pass the test beside the others."""
-    while len(model.terms) > 1 and time.monotonic() < ends:
-        smaller = [
-            fitter.fit([*model.terms[:i], *model.terms[i + 1 :]], model) for i in range(len(model.terms))
-        ]
-        rest = [s for s in smaller if not _accepted(fitter, model, s, null, everything)]
-        if not rest:
-            return model
-        model = min(rest, key=_score)
-    return model
-
-
-def _score(model: Fitted) -> float:
-    """Return the logarithm of the error left out; of models that are alike, the plainer comes first."""
-    return float(np.mean(np.log(model.errors))) + PLAINER * model.size
 
 
 def _distinct(models: Sequence[Fitted]) -> list[Fitted]:
@@ -334,6 +243,3 @@ def _table(
         (made[i].name, screened[i].gain, null.p_value(screened[i].gain) if null else float("nan"))
         for i in order
     ]
-
-
-__all__ = ["Look", "Search", "Term", "doubts", "look", "search"]

@@ -37,8 +37,9 @@ ALIAS = 0.03
 """Part of the best candidate's gain that another may lack and still not be told apart from it."""
 
 LEFT = 0.2
-"""Part of the initial error above the noise floor (squared), from which on the names are the nearest, not
-the right ones."""
+"""Part of the force that there is without an effect (squared, above the noise) that may be left beside it,
+where that is more than noise: with more it is the nearest, not the right one; with less true ones of another
+form than the catalogue's go unnamed."""
 
 TOLERANCE = 0.01
 """Relative force error up to which a model agrees with a recording, whatever the sensor's noise."""

@@ -92,11 +92,6 @@ class Signals:
         return slice(len(BASE) + 1, len(BASE) + 1 + self.reaches.size)
 
     @property
-    def biased(self) -> bool:
-        """Tell whether the belief has a constant force, which is refitted."""
-        return any(ent.kind_of(e).bias for e in self.believed)
-
-    @property
     def faster(self) -> int:
         """Column of the speed of micro-damping: its coefficient is damping times the change of log speed."""
         return len(BASE)

@@ -158,6 +158,10 @@ class Trajectory(Fitter):
         drive, needed = self.balance.both_sides(stage)
         return np.asarray(drive - needed)
 
+    def other_forms(self, model: Fitted) -> Floats:
+        """Return no columns: what a force does to the position is not in proportion to it."""
+        return np.zeros((0, model.residual.size))
+
     def relative(self, model: Fitted) -> float:
         """See `Fitter`: error over travel."""
         return self._relative(model.residual)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from recorded import RATE, run, stage
+from recorded import RATE, run, stage, there_and_back
 
 from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.result import Diagnosis
@@ -89,6 +89,25 @@ def test_what_no_entry_explains_is_not_given_a_name() -> None:
         "values": [0.0, 0.0, 1.5, 0.0, 0.0],
     }
     assert names(answer(stage(), bump)) == [("unexplained",)]
+
+
+def test_another_form_of_an_effect_is_no_second_effect() -> None:
+    """A wave of two harmonics: the catalogue has one, and two other effects together come near as well."""
+    wave = {"name": "cogging", "amplitude": 0.4, "period": 3e-4, "phase": 0.4}
+    second = {"name": "cogging", "amplitude": 0.15, "period": 1.5e-4, "phase": 1.4}
+    recording = run(stage(effects=[wave, second]), there_and_back(12.0))
+    found = diagnose(stage(), [recording], budget=300.0)
+    assert names(found) == [("cogging",), ("unexplained",)]
+
+
+def test_damping_that_nobody_believes_is_no_second_effect() -> None:
+    """Its speed is found beside the effect, whose numbers the former speed had bent."""
+    swings = {"name": "resonance", "mass_ratio": 0.35, "frequency": 15.3, "damping": 0.036}
+    truth = stage(effects=[swings], micro_damping=465.0, micro_damping_speed=1.9e-3)
+    belief = Stage.from_dict(THIN | {"sensor": {"noise": 1.5e-8, "resolution": 1e-8}})
+    found = diagnose(belief, [run(truth, there_and_back(12.0))], budget=300.0)
+    assert names(found) == [("resonance",)]
+    assert found.fit.after < found.fit.floor
 
 
 def test_an_effect_of_somebodys_own_is_found_like_any_other(monkeypatch: pytest.MonkeyPatch) -> None:

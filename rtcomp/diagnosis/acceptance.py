@@ -1,0 +1,98 @@
+"""Acceptance: whether an effect passes the one test, matters, and is a finding; what is left out again."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.fitted import Fitted
+from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.intervals import told
+from rtcomp.diagnosis.other_forms import errors_beside
+from rtcomp.diagnosis.settings import LEAST_GAIN, LEFT, LEVEL, NEGLIGIBLE
+from rtcomp.diagnosis.significance import Null, log_gain
+
+PLAINER = 1e-3
+"""Logarithm of the error that one parameter more must gain to count at all."""
+TOO_MUCH = "{:.0f} % of what there is without it is left, more than noise"
+
+
+def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, everything: float) -> bool:
+    """Tell whether the last effect of a model passes the one test and matters.
+
+    Beside other forms of the effects before it: what these would explain as well is no further effect.
+    """
+    if null is None or model.at_bound:
+        return False
+    forms = fitter.other_forms(parent)
+    before, after = errors_beside(fitter, parent, forms), errors_beside(fitter, model, forms)
+    p = null.p_value(log_gain(before, after))
+    gained = math.sqrt(before.sum()) - math.sqrt(after.sum())
+    if p >= LEVEL or gained <= LEAST_GAIN * math.sqrt(everything):
+        return False
+    return fitter.relative(parent) ** 2 - fitter.relative(model) ** 2 > NEGLIGIBLE**2
+
+
+def exhausted(fitter: Fitter, model: Fitted, everything: float) -> bool:
+    """Tell whether a model leaves too little for any further effect to matter."""
+    little = math.sqrt(model.errors.sum()) <= LEAST_GAIN * math.sqrt(everything)
+    return little or fitter.relative(model) <= NEGLIGIBLE
+
+
+def pruned(
+    fitter: Fitter,
+    model: Fitted,
+    passed: Sequence[Fitted],
+    null: Null | None,
+    everything: float,
+    ends: float,
+) -> Fitted:
+    """Return the model without effects that no longer pass the test beside the others.
+
+    Beside the best of the models of these others: of the fit that is left, and of those that `passed` before.
+    """
+    while len(model.terms) > 1 and time.monotonic() < ends:
+        rest = []
+        for i in range(len(model.terms)):
+            others = [*model.terms[:i], *model.terms[i + 1 :]]
+            alike = [p for p in passed if _same(p.terms, others)]
+            fits = [fitter.fit(others, model), *(fitter.fit(p.terms, p) for p in alike)]
+            smaller = min(fits, key=score)
+            if not accepted(fitter, model, smaller, null, everything):
+                rest.append(smaller)
+        if not rest:
+            return model
+        model = min(rest, key=score)
+    return model
+
+
+def _same(one: Sequence[Term], other: Sequence[Term]) -> bool:
+    """Tell whether terms are of the same effects."""
+    return sorted(str(t.entry["name"]) for t in one) == sorted(str(t.entry["name"]) for t in other)
+
+
+def score(model: Fitted) -> float:
+    """Return the logarithm of the error left out; of models that are alike, the plainer comes first."""
+    return float(np.mean(np.log(model.errors))) + PLAINER * model.size
+
+
+def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[str]:
+    """Return why each effect of a model is no finding, "" where it is one.
+
+    Its size may be nothing, a number of it is at a physical bound, or more is left beside it than noise and a
+    part of what there is without it: what else makes the rest may make that part as well.
+    """
+    said = []
+    for i, span in enumerate(told(fitter, chosen)):
+        why = "its size may be nothing" if span.nothing else ""
+        why = f"{', '.join(span.bound)} at its bound" if span.bound else why
+        if not why and null is not None and null.p_of_error(float(chosen.errors.sum())) < LEVEL:
+            without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
+            left = fitter.above_noise(chosen) ** 2 / max(fitter.above_noise(without) ** 2, 1e-300)
+            why = TOO_MUCH.format(100.0 * min(left, 1.0)) if left > LEFT else ""
+        said.append(why)
+    return said
