@@ -249,13 +249,13 @@ def test_other_forms_of_a_wave_have_its_harmonics_and_no_other_waves() -> None:
     baseline(balance)
     x = balance.plain([p.x for p in balance.paths()])
     entry = {"name": "cogging", "amplitude": 1.0, "period": 1e-4, "phase": 0.3}
-    columns = other_forms(balance, entry, np.sin(2e4 * np.pi * x + 0.3))
+    force = np.sin(2e4 * np.pi * x + 0.3)
+    columns = np.array([as_white(balance, np.ones(x.size)), *other_forms(balance, entry, force)])
 
     def left(period: float) -> float:
         wave = as_white(balance, np.cos(2.0 * np.pi * x / period))
-        return float(
-            np.linalg.norm(wave - np.linalg.lstsq(columns.T, wave, rcond=None)[0] @ columns)
-        ) / float(np.linalg.norm(wave))
+        rest = wave - np.linalg.lstsq(columns.T, wave, rcond=None)[0] @ columns
+        return float(np.linalg.norm(rest) / np.linalg.norm(wave))
 
     assert left(0.5e-4) < 0.1
     assert left(0.77e-4) > 0.8
