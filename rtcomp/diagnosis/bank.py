@@ -137,7 +137,6 @@ def _along(
         level += weights[i] * reaches[i]
         stiffness += weights[i]
     last = np.zeros(out.shape[1])
-    end = motion.shape[0] - 1
     for k in range(motion.shape[0]):
         for j in range(1, parts + 1):
             along_row(w, motion, k, float(j), parts)
@@ -168,24 +167,34 @@ def _along(
                 grown = w[FRICTION] / whole
                 for i in range(count):
                     held[i] *= grown
-            if parts == 2:  # a parabola through both ends and the middle, weighed by the triangle
-                for i in range(out.shape[1]):
-                    third = out[k, i] / 3.0
-                    mean[k, i] += third
-                    if j == 1 and k > 0:
-                        mean[k - 1, i] += third
-                    if j == 2 and k == end:
-                        mean[k, i] += third
-            elif parts > 1:
-                passed = (j - 0.5) / parts
-                for i in range(out.shape[1]):
-                    share = 0.5 * (last[i] + out[k, i]) / parts
-                    last[i] = out[k, i]
-                    mean[k, i] += passed * share
-                    if k > 0:
-                        mean[k - 1, i] += (1.0 - passed) * share
-                    if k == end:  # what comes after the last row is taken to be as before it
-                        mean[k, i] += (1.0 - passed) * share
+            if parts > 1:
+                _share_out(mean, out, last, k, j, parts)
+
+
+@compiled
+def _share_out(mean: Floats, out: Floats, last: Floats, k: int, j: int, parts: int) -> None:
+    """Add part `j` of row `k` to the mean forces around rows; `last` are the forces at the part's beginning.
+
+    What comes after the last row is taken to be as before it.
+    """
+    end = mean.shape[0] - 1
+    passed = (j - 0.5) / parts
+    for i in range(out.shape[1]):
+        if parts == 2:  # a parabola through both ends and the middle, weighed by the triangle
+            third = out[k, i] / 3.0
+            mean[k, i] += third
+            if j == 1 and k > 0:
+                mean[k - 1, i] += third
+            if j == 2 and k == end:
+                mean[k, i] += third
+            continue
+        share = 0.5 * (last[i] + out[k, i]) / parts
+        last[i] = out[k, i]
+        mean[k, i] += passed * share
+        if k > 0:
+            mean[k - 1, i] += (1.0 - passed) * share
+        if k == end:
+            mean[k, i] += (1.0 - passed) * share
 
 
 @compiled

@@ -8,6 +8,33 @@ from rtcomp.kernels import Floats, compiled
 
 
 @compiled
+def _free(gram: Floats, cross: Floats, state: np.ndarray, c: Floats) -> None:
+    """Put the free members of `c` to where the slope is nothing, the others held."""
+    free = np.flatnonzero(state == 0)
+    if free.size == 0:
+        return
+    part = np.empty((free.size, free.size))
+    right = np.empty(free.size)
+    for a in range(free.size):
+        i = free[a]
+        right[a] = cross[i]
+        for j in range(c.size):
+            if state[j] != 0:
+                right[a] -= gram[i, j] * c[j]
+        for b in range(free.size):
+            part[a, b] = gram[i, free[b]]
+    c[free] = np.linalg.solve(part, right)
+
+
+@compiled
+def _wrong(state: int, c: float, slope: float, low: float, high: float, tolerance: float) -> int:
+    """Return -1 or 1 for a free member beyond a bound, 2 for a held one that wants to leave it, else 0."""
+    if state == 0:
+        return -1 if c < low else (1 if c > high else 0)
+    return 2 if state * slope > tolerance else 0
+
+
+@compiled
 def bounded_minimum(gram: Floats, cross: Floats, low: Floats, high: Floats) -> Floats:
     """Minimise c' G c / 2 - h' c within bounds by an active set (Portugal, Judice, Vicente 1994).
 
@@ -20,32 +47,14 @@ def bounded_minimum(gram: Floats, cross: Floats, low: Floats, high: Floats) -> F
     tolerance = 1e-10 * (np.abs(cross).max() + 1.0)
     c = np.zeros(size)
     for _ in range(20 * size):
-        free = np.flatnonzero(state == 0)
         for i in range(size):
             if state[i] != 0:
                 c[i] = low[i] if state[i] < 0 else high[i]
-        if free.size > 0:
-            part = np.empty((free.size, free.size))
-            right = np.empty(free.size)
-            for a in range(free.size):
-                i = free[a]
-                right[a] = cross[i]
-                for j in range(size):
-                    if state[j] != 0:
-                        right[a] -= gram[i, j] * c[j]
-                for b in range(free.size):
-                    part[a, b] = gram[i, free[b]]
-            c[free] = np.linalg.solve(part, right)
+        _free(gram, cross, state, c)
         slope = gram @ c - cross
         count = last = 0
         for i in range(size):
-            wrong[i] = 0
-            if state[i] == 0 and c[i] < low[i]:
-                wrong[i] = -1
-            elif state[i] == 0 and c[i] > high[i]:
-                wrong[i] = 1
-            elif (state[i] < 0 and slope[i] < -tolerance) or (state[i] > 0 and slope[i] > tolerance):
-                wrong[i] = 2
+            wrong[i] = _wrong(state[i], c[i], slope[i], low[i], high[i], tolerance)
             if wrong[i] != 0:
                 count, last = count + 1, i
         if count == 0:

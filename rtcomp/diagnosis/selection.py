@@ -93,18 +93,7 @@ def search(
             else:
                 found.not_tried.append(_further(found.chosen))
             break
-        began = time.monotonic()
-        grown = grow(fitter, beam[0], judged.candidates, judged.screened, ends)
-        short = time.monotonic() > ends
-        for other in beam[1:] if null.p_value(judged.gain) < LEVEL else []:
-            # Another is begun only where one that takes as long would end in time.
-            moment = time.monotonic()
-            short = short or 2.0 * moment - began > ends
-            if short:
-                break
-            began = moment
-            beside = look(fitter, other)
-            grown += grow(fitter, other, beside.candidates, beside.screened, ends)
+        grown, short = _grown(fitter, beam, judged, null.p_value(judged.gain) < LEVEL, ends)
         if short:
             found.not_tried.append(f"some of {_further(found.chosen)}")
         fit = [g for g in grown if accepted(fitter, g, _parent(g, beam), null, everything)]
@@ -116,9 +105,8 @@ def search(
             parents[id(smaller)] = float(_parent(model, beam).errors.sum())
             next_beam.append(smaller)
         passed += good
-        # What is larger must beat the best of the smaller ones, not only that which it grew from.
-        larger = _distinct(sorted(next_beam, key=score))
-        beam = [m for m in larger if accepted(fitter, m, found.chosen, null, everything)]
+        beam = _distinct(sorted(next_beam, key=score))
+        beam = [m for m in beam if _better(fitter, m, found.chosen, null, everything)]
         if not beam:
             break
         if time.monotonic() < ends:
@@ -129,6 +117,32 @@ def search(
             break
     _solid(fitter, found)
     return found
+
+
+def _grown(
+    fitter: Fitter, beam: Sequence[Fitted], seen: Look, others: bool, ends: float
+) -> tuple[list[Fitted], bool]:
+    """Return the best of the beam, beside which was `seen`, and with `others` these too, each with one more.
+
+    And whether time cut it short: another is begun only where one that takes as long would end in time.
+    """
+    began = time.monotonic()
+    grown = grow(fitter, beam[0], seen.candidates, seen.screened, ends)
+    for other in beam[1:] if others else []:
+        moment = time.monotonic()
+        if 2.0 * moment - began > ends:
+            return grown, True
+        began = moment
+        beside = look(fitter, other)
+        grown += grow(fitter, other, beside.candidates, beside.screened, ends)
+    return grown, time.monotonic() > ends
+
+
+def _better(fitter: Fitter, model: Fitted, chosen: Fitted, null: Null, everything: float) -> bool:
+    """Tell whether a model beats that of the step before: a larger one by the one test."""
+    if len(model.terms) > len(chosen.terms):
+        return accepted(fitter, model, chosen, null, everything)
+    return score(model) < score(chosen)
 
 
 def _further(model: Fitted) -> str:

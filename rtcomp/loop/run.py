@@ -98,6 +98,34 @@ def stop_on_signals() -> Iterator[Stop]:
             signal.signal(number, handler)
 
 
+def _lose(tick: Tick, ring: Ring, first: int, references: Floats) -> None:
+    """Record the slots from tick `first` on that passed unseen, one for each of `references`.
+
+    Raises LimitError where they are more than may be lost.
+    """
+    tick.row[at.ROW_OVERRUN] = 2.0
+    for k, reference in enumerate(references, first):
+        tick.row[0] = k * float(tick.settings[at.PERIOD])
+        lost_kernel(reference, tick.settings, tick.row, tick.state, ring.header, ring.rows)
+    if tick.state[at.FAULT]:
+        raise trip(tick, first + len(references) - 1, float(tick.state[at.X1]))
+
+
+def _zero(device: Device, machine: Machine, *, untouched: bool) -> None:
+    """Send zero volts, unless the device is `untouched`; raise OSError where they did not arrive."""
+    with contextlib.suppress(EndOfRun):
+        if not untouched:
+            device.exchange(0.0)
+    if machine.state is State.STOPPING:
+        machine.take(Step.ZEROED)
+
+
+def _let_empty(ring: Ring, recorder_alive: Callable[[], bool] | None) -> None:
+    """Wait until a full ring has been emptied, as long as somebody does so."""
+    while recorder_alive is not None and ring.waiting > ring.capacity - 256 and recorder_alive():
+        time.sleep(0.001)
+
+
 def run(
     device: Device,
     tick: Tick,
@@ -166,15 +194,10 @@ def run(
             if lateness >= period:
                 missed = min(int(lateness / period), last - 1 - done)
                 row[at.ROW_LATENESS] = lateness * 1e6
-                row[at.ROW_OVERRUN] = 2.0
-                for k in range(done, done + missed):
-                    row[0] = k * period
-                    lost_kernel(block[k - first], settings, row, state, header, rows)
                 lost += missed
                 done += missed
+                _lose(tick, ring, done - missed, block[done - missed - first : done - first])
                 lateness -= missed * period
-                if state[at.FAULT]:
-                    raise trip(tick, done - 1, float(state[at.X1]))
             try:
                 sample = device.exchange(volts)
             except EndOfRun:
@@ -199,8 +222,7 @@ def run(
                     raise trip(tick, done - 1, sample.position, int(header[STOPPED]))
                 follow(machine, State(int(mode)), sample.position)
             if virtual and not done & 255:
-                while recorder_alive is not None and ring.waiting > ring.capacity - 256 and recorder_alive():
-                    time.sleep(0.001)
+                _let_empty(ring, recorder_alive)
                 if progress is not None and time.perf_counter() - shown > 0.1:
                     shown = time.perf_counter()
                     progress(done, row)
@@ -220,11 +242,7 @@ def run(
     finally:
         # Whatever happened: zero volts, then let go; a failure of the one must not keep us from the other.
         try:
-            with contextlib.suppress(EndOfRun):
-                if not untouched:
-                    device.exchange(0.0)
-            if machine.state is State.STOPPING:
-                machine.take(Step.ZEROED)
+            _zero(device, machine, untouched=untouched)
         except OSError:
             if ended == 1:
                 fail(machine, "zero volts did not arrive")
