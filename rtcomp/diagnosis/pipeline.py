@@ -20,7 +20,7 @@ from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.result import Diagnosis, Place
 from rtcomp.diagnosis.selection import Look, Search, look, search
 from rtcomp.diagnosis.settings import BUDGET
-from rtcomp.diagnosis.sticking import MUCH, mostly_hidden
+from rtcomp.diagnosis.sticking import MUCH, part_untold
 from rtcomp.diagnosis.trajectory import Trajectory
 from rtcomp.diagnosis.validation import Reserved
 from rtcomp.diagnosis.where import Compared, as_force
@@ -30,14 +30,14 @@ from rtcomp.stage.stage import Stage
 
 Progress = Callable[[float, str], None]
 STICKS = (
-    "the axis sticks finer than a count of its sensor in {:.0f} % of the rows, where motion tells nothing of "
-    "friction: judged by position, simulated over {:.2g} s from points of the recording"
+    "the axis sticks finer than a count of its sensor, which leaves {:.2g} % of the force open to friction: "
+    "judged by position, simulated over {:.2g} s from points of the recording"
 )
 SEARCH, TELL_APART = 0.75, 0.9
 """Parts of the budget at which the search ends, and what then tells its models apart."""
 BAND_LIMITED = "the command is taken as band-limited between rows, which fits better than held"
 LOUD = 0.03
-"""Relative force error of noise alone. Above it, an axis that mostly sticks is judged by its position."""
+"""Relative force error of noise alone. Above it, an axis that sticks unseen is judged by its position."""
 Located = Callable[[float, Sequence[Place]], None]
 """Told, before anything is named, what part of the force the refitted stage leaves open (rms), and where."""
 
@@ -88,8 +88,8 @@ def _diagnosed(
         left = (base.sse / max(balance.power, 1e-300)) ** 0.5
         located(left, locate(view, before, None, seed, stage.axis))
     say(1.0, "balance")
-    unseen = mostly_hidden(stage, recordings)
-    if unseen > MUCH and _loud(balance):
+    untold = part_untold(stage, recordings)
+    if untold > MUCH and _loud(balance):
         objectives = [_by_trajectory(objectives[0])]
     fitter, found = _searched(objectives, ends - (1.0 - SEARCH) * budget, say, seed)
     say(0.0, "tell apart")
@@ -100,13 +100,13 @@ def _diagnosed(
     done = answer(stage, fitter, found, sets, reserved, seed, late=time.monotonic() > ends)
     say(1.0, "judge")
     notes = [BAND_LIMITED] if len(objectives) > 1 and not fitter.balance.data.held else []
-    notes += [STICKS.format(100.0 * unseen, done.position.seconds)] if done.position is not None else []
+    notes += [STICKS.format(100.0 * untold, done.position.seconds)] if done.position is not None else []
     notes += [f"not tried within {budget:g} s: {what}" for what in found.not_tried]
     return replace(done, notes=[*notes, *done.notes], not_tried=found.not_tried)
 
 
 def _loud(balance: ForceBalance) -> bool:
-    """Tell whether noise alone leaves so much force that it is no judge of an axis that mostly sticks."""
+    """Tell whether noise alone leaves so much force that it is no judge of an axis that sticks unseen."""
     rows = ~balance.reserved[balance.block]
     return balance.noise_power > LOUD**2 * float(np.mean(balance.drive_force()[rows] ** 2))
 

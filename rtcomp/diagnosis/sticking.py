@@ -1,4 +1,4 @@
-"""Rows in which friction cannot be told from the motion: the axis sticks finer than its sensor sees."""
+"""Force of friction that no motion tells: the axis sticks finer than its sensor sees."""
 
 from __future__ import annotations
 
@@ -11,51 +11,48 @@ from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
 
-CHANGE = 0.2
-"""Part of friction's level by which the drive's force changes while the position stays within a count."""
-MUCH = 0.2
-"""Part of the rows in which it does, from which on a balance of forces does not decide anything."""
+MUCH = 0.05
+"""Part of the drive's force (rms) that no motion tells, from which on a balance of forces may not decide."""
 
 
-def hidden(stage: Stage, reading: Floats, voltage: Floats, count: float) -> np.ndarray:
-    """Return the rows (K,) bool of stretches that tell nothing of friction.
+def untold(stage: Stage, reading: Floats, voltage: Floats) -> Floats:
+    """Return how far apart the forces (N) lie, (K,), that a row's reading leaves open to friction.
 
-    In such a stretch the reading stays within one and a half counts (`count`, m) while the drive's force goes
-    up or down by CHANGE of friction's level: the friction that balanced it left no trace in the motion.
+    In a stretch in which the reading stays within one and a half counts of the sensor, what friction did left
+    no trace: it went along with the drive's force, over as much as that went up and down, or over all that
+    friction can do.
     """
     friction = stage.friction
     level = friction.level if isinstance(friction, MaxwellSlip) else 0.0
-    if count <= 0.0 or level <= 0.0:
-        return np.zeros(reading.size, dtype=np.bool_)
-    force = stage.force_constant * np.clip(voltage, -stage.voltage_limit, stage.voltage_limit)
-    out = np.zeros(reading.size, dtype=np.bool_)
-    _mark(np.ascontiguousarray(reading), force, 1.5 * count, CHANGE * level, out)
+    count = max(stage.sensor.resolution, 4.0 * stage.sensor.noise)  # m
+    out = np.zeros(reading.size)
+    if count > 0.0 and level > 0.0:
+        force = _force(stage, voltage)
+        _widths(np.ascontiguousarray(reading), force, 1.5 * count, 2.0 * level, out)
     return out
 
 
+def part_untold(stage: Stage, recordings: Sequence[Recording]) -> float:
+    """Return the part of the drive's force that is open so, rms over rms: evenly spread within its width."""
+    open_to = sum(float(np.sum(untold(stage, r.position, r.voltage) ** 2)) / 12.0 for r in recordings)
+    given = sum(float(np.sum(_force(stage, r.voltage) ** 2)) for r in recordings)
+    return float(np.sqrt(open_to / max(given, 1e-300)))
+
+
+def _force(stage: Stage, voltage: Floats) -> Floats:
+    return stage.force_constant * np.clip(voltage, -stage.voltage_limit, stage.voltage_limit)
+
+
 @compiled
-def _mark(x: Floats, force: Floats, width: float, change: float, out: np.ndarray) -> None:
+def _widths(x: Floats, force: Floats, width: float, most: float, out: Floats) -> None:
     first = 0
     while first < x.size:
         low = high = x[first]
-        least = most = force[first]
+        least = largest = force[first]
         last = first + 1
         while last < x.size and max(high, x[last]) - min(low, x[last]) <= width:
             low, high = min(low, x[last]), max(high, x[last])
-            least, most = min(least, force[last]), max(most, force[last])
+            least, largest = min(least, force[last]), max(largest, force[last])
             last += 1
-        if most - least > change:
-            out[first:last] = True
+        out[first:last] = min(largest - least, most)
         first = last
-
-
-def count_of(stage: Stage) -> float:
-    """Return what of a motion the sensor does not see (m): its count, or where that is not said its noise."""
-    return max(stage.sensor.resolution, 4.0 * stage.sensor.noise)
-
-
-def mostly_hidden(stage: Stage, recordings: Sequence[Recording]) -> float:
-    """Return the part of all rows that is hidden."""
-    count = count_of(stage)
-    marked = [hidden(stage, r.position, r.voltage, count) for r in recordings]
-    return float(sum(int(m.sum()) for m in marked)) / max(sum(m.size for m in marked), 1)

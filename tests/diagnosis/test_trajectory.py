@@ -15,7 +15,7 @@ from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.replicate import replicate
-from rtcomp.diagnosis.sticking import MUCH, hidden, mostly_hidden
+from rtcomp.diagnosis.sticking import MUCH, part_untold, untold
 from rtcomp.diagnosis.trajectory import Trajectory
 from rtcomp.diagnosis.windows import GROUPS, Windows
 from rtcomp.jobs.demo import shipped
@@ -80,23 +80,30 @@ def loaded() -> list[Recording]:
     return both(stage(LOAD))
 
 
-def test_sticking_finer_than_a_count_is_told_from_rest_and_from_motion() -> None:
+def test_force_that_a_count_hides_is_told_from_rest_and_from_motion() -> None:
     axis = stage()
     rows = np.arange(600)
     position = np.where(rows < 300, 0.2, 0.2 + (rows - 300) * 5e-3) + COUNT * 0.4 * (rows % 2)
-    changing = 200.0 + 100.0 * np.sin(rows / 20.0)
-    found = hidden(axis, position, changing, COUNT)
-    assert found[:300].all() and not found[305:].any()
-    assert not hidden(axis, position, np.full(600, 200.0), COUNT).any()
-    assert not hidden(axis, position, changing, 0.0).any()
+    changing = 20.0 + 10.0 * np.sin(rows / 20.0)
+    found = untold(axis, position, changing)
+    assert found[:300] == pytest.approx(20.0 * axis.force_constant, rel=1e-2)
+    assert found[305:].max() < 0.05 * found[0]
+    assert not untold(axis, position, np.full(600, 20.0)).any()
+    assert untold(axis, position, 20.0 * changing).max() == pytest.approx(2.0 * axis.friction.level)  # type: ignore[union-attr]
+    exact = Stage.from_dict({**axis.to_dict(), "sensor": {}})
+    assert not untold(exact, position, changing).any()
 
 
 def test_presliding_that_the_sensor_resolves_is_not_hidden() -> None:
     plant = stage(friction=[{"stiffness": 1.0, "reach": 0.04}])
     sees = Stage.from_dict({**plant.to_dict(), "sensor": {"resolution": 1e-6}})
-    assert (
-        mostly_hidden(sees, [recorded(sees)]) < 0.02 < MUCH < mostly_hidden(stage(), [recorded(stage(LOAD))])
-    )
+    assert part_untold(sees, [recorded(sees)]) < 0.02 < MUCH < part_untold(stage(), [recorded(stage(LOAD))])
+
+
+def test_friction_that_is_little_beside_a_spring_hides_nothing() -> None:
+    spring = {"name": "parallel-spring", "stiffness": 2.0}
+    sprung = stage(spring, friction=[{"stiffness": 1.0, "reach": 1.0e-3}])
+    assert part_untold(sprung, [recorded(sprung)]) < 0.1 * MUCH
 
 
 def test_windows_lie_apart_and_those_of_reserved_blocks_are_a_group_of_their_own(
