@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -80,19 +81,31 @@ def score(model: Fitted) -> float:
     return float(np.mean(np.log(model.errors))) + PLAINER * model.size
 
 
-def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[str]:
-    """Return why each effect of a model is no finding, "" where it is one.
+@dataclass(frozen=True)
+class Doubt:
+    """Why an effect of a model is no finding."""
+
+    why: str
+    """Empty where it is one."""
+    left: float
+    """Part that is left of the force that there is without it, squared and above the noise."""
+
+
+def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
+    """Return why each effect of a model is no finding.
 
     Its size may be nothing, a number of it is at a physical bound, or more is left beside it than noise and a
     part of what there is without it: what else makes the rest may make that part as well.
     """
     said = []
+    more = null is not None and null.p_of_error(float(chosen.errors.sum())) < LEVEL
     for i, span in enumerate(told(fitter, chosen)):
         why = "its size may be nothing" if span.nothing else ""
         why = f"{', '.join(span.bound)} at its bound" if span.bound else why
-        if not why and null is not None and null.p_of_error(float(chosen.errors.sum())) < LEVEL:
+        left = 1.0
+        if not why:
             without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
             left = fitter.above_noise(chosen) ** 2 / max(fitter.above_noise(without) ** 2, 1e-300)
-            why = TOO_MUCH.format(100.0 * min(left, 1.0)) if left > LEFT else ""
-        said.append(why)
+            why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""
+        said.append(Doubt(why, left))
     return said

@@ -47,6 +47,8 @@ class Belief:
         self.sizes: Floats = np.concatenate([np.zeros(0), *(ent.sizes_of(e) for e in self.own)])
         m = stage.mechanics
         found = [Number(n, 0.0, near=True) for n in BASE if float(getattr(m, n)) > 0.0]
+        if m.micro_damping > 0.0:
+            found.append(Number("micro_damping_speed", 0.0, near=True))
         if isinstance(m.friction, list):
             found += [Number(LEVEL, 0.0, near=False), Number(REACH, 0.0, near=False)]
         for i, size in enumerate(self.sizes.tolist()):

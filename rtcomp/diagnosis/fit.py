@@ -84,9 +84,12 @@ class Fitter:
         """Tell whether the objective can tell an effect at all."""
         return True
 
-    def rough(self, model: Fitted, terms: Sequence[Term], count: int, ends: float) -> list[Term]:
-        """Return the `count` of `terms`, the likeliest first, that are worth a full fit beside a model."""
-        return list(terms[:count])
+    def rough(self, model: Fitted, families: Sequence[Sequence[Term]], count: int, ends: float) -> list[Term]:
+        """Return terms of `count` families that are worth a full fit beside a model.
+
+        The likeliest come first in `families` and in each.
+        """
+        return [terms[0] for terms in families[:count]]
 
     def units(self, entries: Sequence[Entry]) -> Floats:
         """Return the columns (q, n) of unit sizes of the last of `entries`, which is `linear`."""

@@ -13,7 +13,6 @@ from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.replicates import best
 from rtcomp.diagnosis.screening import Screened
 from rtcomp.diagnosis.settings import FULL_FITS
 from rtcomp.errors import ConfigError
@@ -26,8 +25,10 @@ def grow(
     fitter: Fitter, model: Fitted, made: Sequence[Candidate], screened: Sequence[Screened], ends: float
 ) -> list[Fitted]:
     """Return the model with each of the best candidates, fitted in full."""
-    order = best([c.family for c in made], [s.gain for s in screened], len(made))
-    terms = fitter.rough(model, [started(made[i], screened[i].sizes) for i in order], FULL_FITS, ends)
+    families: dict[str, list[Term]] = {}
+    for i in np.argsort([-s.gain for s in screened], kind="stable").tolist():
+        families.setdefault(made[i].family, []).append(started(made[i], screened[i].sizes))
+    terms = fitter.rough(model, list(families.values()), FULL_FITS, ends)
     # First order is no guide to what is behind a play: its own motion is followed from place to place.
     behind = {c.name: c.term for c in made if fitter.gridded and ent.kind_of(c.term.entry).behind}
     terms = [t for t in terms if t.entry["name"] not in behind]

@@ -32,16 +32,16 @@ class Noise:
     """Hz, up to which signal is at least as strong as noise."""
 
     @classmethod
-    def of(cls, stage: Stage, data: Data) -> Noise:
+    def of(cls, stage: Stage, data: Data, least: float = 0.0) -> Noise:
         """Take the noise that the stage states, within what the recording can have; else the recording's.
 
         Noise that is larger than all there is at some frequency is not there; where a stage says nothing,
-        the weakest band of the spectrum tells how much there can be.
+        the weakest band of the spectrum tells how much there can be, and it is `least` (m rms) or more.
         """
         frequency, density = spectrum([s.position for s in data.segments], data.rate)
         most = float(np.sqrt(density.min() * 0.5 * data.rate))
-        stated = float(np.hypot(stage.sensor.noise, stage.sensor.resolution / np.sqrt(12.0)))
-        rms = min(max(stated, 0.1 * most), most) if stated > 0.0 else most
+        stated = cls.stated(stage)
+        rms = min(max(stated, 0.1 * most), most) if stated > 0.0 else max(most, least)
         floor = rms**2 / (0.5 * data.rate)
         share = np.maximum(1.0 - floor / density, 0.0)
         # Once lost in noise, higher bands are only chance.
@@ -50,6 +50,11 @@ class Noise:
         share[last + 1 :] = np.minimum(share[last + 1 :], 1e-3)
         share = np.maximum(share, 1e-6)
         return cls(rms, interpolated(frequency, share), float(frequency[last]))
+
+    @staticmethod
+    def stated(stage: Stage) -> float:
+        """Return what a stage says of its sensor's noise and counts (m rms), 0 where nothing."""
+        return float(np.hypot(stage.sensor.noise, stage.sensor.resolution / np.sqrt(12.0)))
 
 
 @dataclass(frozen=True)
@@ -95,3 +100,17 @@ class Whitening:
         """Return the rows of a segment that are compared."""
         first = self.edge + max(segment.run_in - self.lead, 0)
         return slice(first, max(segment.time.size - self.edge, first + 1), self.thinning)
+
+    def noise_within(self, rows: list[Floats], noise: Noise, data: Data) -> float:
+        """Return the most noise (m rms) that compared residuals allow, a segment each: their weakest band's.
+
+        Of the bands in which the motion stands above the noise. Above these a recording may have been cut off
+        by a filter, noise and all.
+        """
+        frequency, density = spectrum(rows, data.rate / self.thinning)
+        share = noise.wiener(frequency)
+        inside = share > 0.5
+        if not inside.any():
+            return 0.0
+        alone = share[inside] ** 2 / (0.5 * data.rate)
+        return noise.rms * float(np.sqrt(np.min(density[inside] / alone)))

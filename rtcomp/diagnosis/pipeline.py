@@ -36,8 +36,6 @@ STICKS = (
 SEARCH, TELL_APART = 0.75, 0.9
 """Parts of the budget at which the search ends, and what then tells its models apart."""
 BAND_LIMITED = "the command is taken as band-limited between rows, which fits better than held"
-LOUD = 0.03
-"""Relative force error of noise alone. Above it, an axis that sticks unseen is judged by its position."""
 Located = Callable[[float, Sequence[Place]], None]
 """Told, before anything is named, what part of the force the refitted stage leaves open (rms), and where."""
 
@@ -90,7 +88,7 @@ def _diagnosed(
     say(1.0, "balance")
     untold = part_untold(stage, recordings)
     if untold > MUCH and _loud(balance):
-        objectives = [_by_trajectory(objectives[0])]
+        objectives = [_by_trajectory(stage, objectives[0])]
     fitter, found = _searched(objectives, ends - (1.0 - SEARCH) * budget, say, seed)
     say(0.0, "tell apart")
     sets = alternatives(fitter, found, ends - (1.0 - TELL_APART) * budget)
@@ -108,14 +106,12 @@ def _diagnosed(
 def _loud(balance: ForceBalance) -> bool:
     """Tell whether noise alone leaves so much force that it is no judge of an axis that sticks unseen."""
     rows = ~balance.reserved[balance.block]
-    return balance.noise_power > LOUD**2 * float(np.mean(balance.drive_force()[rows] ** 2))
+    return balance.noise_power > MUCH**2 * float(np.mean(balance.drive_force()[rows] ** 2))
 
 
-def _by_trajectory(by_force: Objective) -> Objective:
+def _by_trajectory(stage: Stage, by_force: Objective) -> Objective:
     """Return the objective that judges by simulated position, on the same blocks."""
-    believed = by_force.balance.stage
-    if believed.friction is None:
-        believed = by_force.fitter.stage(by_force.base)
+    believed = stage if stage.friction is not None else by_force.fitter.stage(by_force.base)
     fitter = Trajectory.of(by_force.balance, believed)
     return Objective(fitter, fitter.fit([]))
 
@@ -148,12 +144,24 @@ def _objectives(stage: Stage, recordings: Sequence[Recording], held: bool | None
         bandwidth = Noise.of(stage, data).bandwidth
         balance = ForceBalance(stage, load_data(recordings, held=way, bandwidth=bandwidth))
         base = baseline(balance)
+        if (least := _unstated_noise(balance, base)) > balance.noise.rms:
+            balance = ForceBalance(stage, balance.data, Noise.of(stage, balance.data, least))
+            base = baseline(balance)
         fitter = Fitter(balance)
         made.append(Objective(fitter, with_offset(fitter, base)))
     if len(made) == 1:
         return made
     looked = [replace(one, first=look(one.fitter, one.base)) for one in made]
     return sorted(looked, key=_left_beside)
+
+
+def _unstated_noise(balance: ForceBalance, base: Fitted) -> float:
+    """Return how much noise (m rms) the refitted belief allows where the stage says nothing of it, else 0."""
+    if Noise.stated(balance.stage) > 0.0 or balance.data.averaged > 1:
+        return 0.0
+    sizes = np.cumsum([s.time[balance.whitening.rows(s)].size for s in balance.data.segments])
+    rows = np.split(base.residual, sizes[:-1])
+    return balance.whitening.noise_within(rows, balance.noise, balance.data)
 
 
 def _left_beside(one: Objective) -> float:

@@ -150,13 +150,14 @@ def _further(model: Fitted) -> str:
 
 
 def _solid(fitter: Fitter, found: Search) -> None:
-    """Leave out effects that are no finding, and refit the others."""
+    """Leave out effects that are no finding, the most doubtful first, and refit the others."""
     while found.chosen.terms:
-        weak = [(i, why) for i, why in enumerate(doubts(fitter, found.chosen, found.null)) if why]
+        doubted = doubts(fitter, found.chosen, found.null)
+        weak = [i for i, doubt in enumerate(doubted) if doubt.why]
         if not weak:
             return
-        at, why = weak[-1]
-        found.dropped.append(f"{ent.names(found.chosen.entries)[at]} is not named: {why}")
+        at = max(weak, key=lambda i: doubted[i].left)
+        found.dropped.append(f"{ent.names(found.chosen.entries)[at]} is not named: {doubted[at].why}")
         kept = [t for i, t in enumerate(found.chosen.terms) if i != at]
         found.chosen, found.alternatives, found.beside = fitter.fit(kept, found.chosen), [], None
 

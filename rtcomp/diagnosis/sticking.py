@@ -11,8 +11,9 @@ from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
 
-MUCH = 0.05
-"""Part of the drive's force (rms) that no motion tells, from which on a balance of forces may not decide."""
+MUCH = 0.03
+"""Part of the drive's force (rms). Where noise makes more of a balance of forces, and friction that no motion
+tells may make more too, the balance is no judge."""
 
 
 def untold(stage: Stage, reading: Floats, voltage: Floats) -> Floats:

@@ -8,12 +8,11 @@ which far ones count less. Blocks are left out on the problem linearised where t
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 
 import numpy as np
 
-from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis import starting
 from rtcomp.diagnosis.balance import ForceBalance, System
 from rtcomp.diagnosis.belief import LEVEL, Belief, is_sized
 from rtcomp.diagnosis.cores import shared
@@ -35,10 +34,6 @@ STEP = 5e-3
 """With which derivatives along the numbers of the belief are taken."""
 RELEASED = 0.3
 """Part of friction's level that a fit starts from too: the rest may have been what the effect makes."""
-TIMES = (0.1, 0.3, 3.0, 10.0)
-"""Times the size that first order has, at which an effect is tried too."""
-FEW = 3
-"""Steps after which the starts of a fit are compared."""
 SETTLED = 3e-4
 """Relative gain of a step below which a fit ends."""
 TRIES = 4
@@ -97,45 +92,9 @@ class Trajectory(Fitter):
         """See `Fitter`: what a sensor does is no motion, and in so short a window no more than one."""
         return kind.place is not Place.SENSOR
 
-    def rough(self, model: Fitted, terms: Sequence[Term], count: int, ends: float) -> list[Term]:
-        """See `Fitter`: first order is no guide to what sticks, so each is fitted for a few steps."""
-
-        def sized(term: Term) -> tuple[float, Term]:
-            found = [(self._left(model, one), one) for one in self._sizes_of(term)]
-            return min(found, key=lambda pair: pair[0])
-
-        def tried(term: Term) -> tuple[float, Term]:
-            if time.monotonic() > ends:
-                return math.inf, term
-            try:
-                _, moved, left = self._moved(model.coefficients, [*model.terms, term], FEW, entries=True)
-            except (ConfigError, np.linalg.LinAlgError):
-                return math.inf, term
-            return left, moved[-1]
-
-        best = _first(shared(sized, terms), 3 * count)
-        return _first(shared(tried, best), count)
-
-    def _left(self, model: Fitted, term: Term) -> float:
-        try:
-            rest = self.residual(model.coefficients, [*model.terms, term])
-        except ConfigError:
-            return math.inf
-        return float(np.sum(rest[self.rows] ** 2))
-
-    def _sizes_of(self, term: Term) -> list[Term]:
-        """Return a term at its own and at smaller and larger sizes."""
-        kind = ent.kind_of(term.entry)
-        found = [term]
-        for times in TIMES:
-            entry = dict(term.entry)
-            for p in kind.parameters:
-                if p.name in kind.linear and p.name in entry:
-                    neutral = ent.neutral(kind, p.name)
-                    value = neutral + times * (float(entry[p.name]) - neutral)
-                    entry[p.name] = min(max(value, 0.9 * p.lowest), 0.9 * p.high)
-            found.append(term.with_entry(entry))
-        return found
+    def rough(self, model: Fitted, families: Sequence[Sequence[Term]], count: int, ends: float) -> list[Term]:
+        """See `Fitter`: first order is no guide to what sticks."""
+        return starting.likeliest(self, model, families, count, ends)
 
     def change(self, model: Fitted, entry: Entry) -> Floats:
         """See `Fitter`."""
@@ -239,13 +198,13 @@ class Trajectory(Fitter):
             levels = [i for i, n in enumerate(self.belief.numbers) if n.name == LEVEL]
             released[levels] += math.log(RELEASED)
             begun += [released] if levels else []
-        few = FEW if len(begun) > 1 else 0
-        tried = [self._moved(one, list(terms), few, entries=True) for one in begun]
+        few = starting.FEW if len(begun) > 1 else 0
+        tried = [self.moved(one, list(terms), few, entries=True) for one in begun]
         c, found, _ = min(tried, key=lambda t: t[2])
-        c, found, _ = self._moved(c, found, max(steps, FEW), entries=steps > 0)
+        c, found, _ = self.moved(c, found, max(steps, starting.FEW), entries=steps > 0)
         return self._ended(c, found)
 
-    def _moved(
+    def moved(
         self, c: Floats, terms: list[Term], steps: int, *, entries: bool
     ) -> tuple[Floats, list[Term], float]:
         """Return numbers and terms after Levenberg-Marquardt steps, and what they leave with the prior."""
@@ -336,9 +295,3 @@ class Trajectory(Fitter):
             tuple(terms), c, system, prior, rest, tangents, tuple(free), errors, without, sse, variance,
             np.zeros(0),
         )  # fmt: skip
-
-
-def _first(found: Sequence[tuple[float, Term]], count: int) -> list[Term]:
-    """Return the terms that leave least."""
-    order = np.argsort([left for left, _ in found], kind="stable")
-    return [found[i][1] for i in order[:count].tolist()]

@@ -305,4 +305,4 @@ def test_an_effect_is_doubted_where_much_is_left_beside_it(bump: float, doubted:
     base, fitter = baseline(balance), Fitter(balance)
     chosen = fitter.fit([Term.of(wave)], base)
     noise = Null(np.ones(19), chosen.errors.size * np.linspace(0.9, 1.1, 19))
-    assert bool(doubts(fitter, chosen, noise)[0]) == doubted
+    assert bool(doubts(fitter, chosen, noise)[0].why) == doubted

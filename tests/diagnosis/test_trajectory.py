@@ -150,6 +150,23 @@ def test_numbers_that_are_off_come_back() -> None:
     assert fitter.relative(model) < 0.2 * fitter.relative_of(off)
 
 
+def test_damping_below_a_speed_comes_back_where_the_belief_has_another_speed() -> None:
+    true = stage(micro_damping=0.3, micro_damping_speed=0.3)
+    data = both(true)
+    off = stage(micro_damping=0.3, micro_damping_speed=0.4)
+    fitter = Trajectory.of(balanced(off, data), off)
+    mechanics = fitter.stage(fitter.fit([])).mechanics
+    assert mechanics.micro_damping_speed == pytest.approx(0.3, rel=0.1)
+
+
+@pytest.mark.slow
+def test_a_band_without_force_that_friction_takes_up_is_named() -> None:
+    done = diagnose(stage(), both(stage({"name": "drive-deadband", "width": 40.0})), budget=200.0)
+    assert done.verdict == "missing-physics"
+    assert [effect.names[0] for effect in done.effects] == ["drive-deadband"]
+    assert done.effects[0].parameters["width"].value == pytest.approx(40.0, rel=0.15)
+
+
 def test_what_a_model_lacks_is_what_its_slopes_say() -> None:
     """The fit's own linearisation predicts what a small change of a number does."""
     data = both(stage())
@@ -175,7 +192,7 @@ def test_friction_that_grows_with_the_load_is_named(loaded: list[Recording]) -> 
 
 @pytest.mark.slow
 def test_a_pendulum_as_believed_is_left_in_peace() -> None:
-    plant = stage()
+    plant = stage(friction=[{"stiffness": 80.0, "reach": 1.0e-3}])
     done = diagnose(plant, both(plant))
     assert done.position is not None
     assert done.verdict in ("consistent", "retuned") and not done.effects
