@@ -98,6 +98,7 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
     part of what there is without it: what else makes the rest may make that part as well.
     """
     said = []
+    louder = fitter.louder(chosen)
     more = null is not None and null.p_of_error(float(chosen.errors.sum())) < LEVEL
     for i, span in enumerate(told(fitter, chosen)):
         why = "its size may be nothing" if span.nothing else ""
@@ -105,7 +106,8 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
         left = 1.0
         if not why:
             without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
-            left = fitter.above_noise(chosen) ** 2 / max(fitter.above_noise(without) ** 2, 1e-300)
+            left, there = (fitter.above_noise(model, louder) ** 2 for model in (chosen, without))
+            left /= max(there, 1e-300)
             why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""
         said.append(Doubt(why, left))
     return said

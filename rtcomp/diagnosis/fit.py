@@ -20,6 +20,7 @@ from rtcomp.diagnosis.data import Data
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitted import Fitted, left_out
 from rtcomp.diagnosis.free import Free, Term, free_of
+from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.other_forms import other_forms
 from rtcomp.diagnosis.regression import Grams, Prior
 from rtcomp.diagnosis.result import PositionFit
@@ -140,10 +141,19 @@ class Fitter:
         """Tell whether a model has a constant force beside its entries."""
         return bool(model.coefficients[self.balance.size - 1] != 0.0)
 
-    def above_noise(self, model: Fitted) -> float:
-        """Return that relative error (rms) as far as the sensor's noise does not account for it."""
+    def louder(self, model: Fitted) -> float:
+        """Return how many times louder noise may be by what a model leaves, where none is stated."""
+        b = self.balance
+        if Noise.stated(b.stage) > 0.0:
+            return 1.0
+        sizes = [s.time[b.whitening.rows(s)].size for s in b.data.segments]
+        rows = np.split(model.residual, np.cumsum(sizes)[:-1])
+        return b.whitening.louder(rows, b.noise, b.data)
+
+    def above_noise(self, model: Fitted, louder: float = 1.0) -> float:
+        """Return that relative error (rms) above that of noise, so many times `louder`."""
         power = float(np.mean(self.balance.drive_force() ** 2))
-        noise = self.balance.noise_power / max(power, 1e-300)
+        noise = louder**2 * self.balance.noise_power / max(power, 1e-300)
         return float(np.sqrt(max(self.relative(model) ** 2 - noise, 0.0)))
 
     def numbers(self, model: Fitted, *, effects: bool) -> tuple[Floats, Floats, Floats]:

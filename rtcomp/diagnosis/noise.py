@@ -32,16 +32,16 @@ class Noise:
     """Hz, up to which signal is at least as strong as noise."""
 
     @classmethod
-    def of(cls, stage: Stage, data: Data, least: float = 0.0) -> Noise:
+    def of(cls, stage: Stage, data: Data) -> Noise:
         """Take the noise that the stage states, within what the recording can have; else the recording's.
 
         Noise that is larger than all there is at some frequency is not there; where a stage says nothing,
-        the weakest band of the spectrum tells how much there can be, and it is `least` (m rms) or more.
+        the weakest band of the spectrum tells how much there can be.
         """
         frequency, density = spectrum([s.position for s in data.segments], data.rate)
         most = float(np.sqrt(density.min() * 0.5 * data.rate))
         stated = cls.stated(stage)
-        rms = min(max(stated, 0.1 * most), most) if stated > 0.0 else max(most, least)
+        rms = min(max(stated, 0.1 * most), most) if stated > 0.0 else most
         floor = rms**2 / (0.5 * data.rate)
         share = np.maximum(1.0 - floor / density, 0.0)
         # Once lost in noise, higher bands are only chance.
@@ -101,8 +101,8 @@ class Whitening:
         first = self.edge + max(segment.run_in - self.lead, 0)
         return slice(first, max(segment.time.size - self.edge, first + 1), self.thinning)
 
-    def noise_within(self, rows: list[Floats], noise: Noise, data: Data) -> float:
-        """Return the most noise (m rms) that compared residuals allow, a segment each: their weakest band's.
+    def louder(self, rows: list[Floats], noise: Noise, data: Data) -> float:
+        """Return how many times louder noise may be by the weakest band of residuals, a segment each.
 
         Of the bands in which the motion stands above the noise. Above these a recording may have been cut off
         by a filter, noise and all.
@@ -111,6 +111,6 @@ class Whitening:
         share = noise.wiener(frequency)
         inside = share > 0.5
         if not inside.any():
-            return 0.0
+            return 1.0
         alone = share[inside] ** 2 / (0.5 * data.rate)
-        return noise.rms * float(np.sqrt(np.min(density[inside] / alone)))
+        return max(float(np.sqrt(np.min(density[inside] / alone))), 1.0)

@@ -144,24 +144,12 @@ def _objectives(stage: Stage, recordings: Sequence[Recording], held: bool | None
         bandwidth = Noise.of(stage, data).bandwidth
         balance = ForceBalance(stage, load_data(recordings, held=way, bandwidth=bandwidth))
         base = baseline(balance)
-        if (least := _unstated_noise(balance, base)) > balance.noise.rms:
-            balance = ForceBalance(stage, balance.data, Noise.of(stage, balance.data, least))
-            base = baseline(balance)
         fitter = Fitter(balance)
         made.append(Objective(fitter, with_offset(fitter, base)))
     if len(made) == 1:
         return made
     looked = [replace(one, first=look(one.fitter, one.base)) for one in made]
     return sorted(looked, key=_left_beside)
-
-
-def _unstated_noise(balance: ForceBalance, base: Fitted) -> float:
-    """Return how much noise (m rms) the refitted belief allows where the stage says nothing of it, else 0."""
-    if Noise.stated(balance.stage) > 0.0 or balance.data.averaged > 1:
-        return 0.0
-    sizes = np.cumsum([s.time[balance.whitening.rows(s)].size for s in balance.data.segments])
-    rows = np.split(base.residual, sizes[:-1])
-    return balance.whitening.noise_within(rows, balance.noise, balance.data)
 
 
 def _left_beside(one: Objective) -> float:

@@ -43,7 +43,7 @@ class Stepped(Protocol):
 def likeliest(
     fitter: Stepped, model: Fitted, families: Sequence[Sequence[Term]], count: int, ends: float
 ) -> list[Term]:
-    """Return the starts of the `count` families that leave least beside a model after a few steps.
+    """Return `count` terms, two starts of each family that leaves least beside a model after a few steps.
 
     The best come first. Each family has its terms, the likeliest to first order first. What friction can take
     up, as a band without force, is nothing to first order: the largest that leaves no more is tried too.
@@ -64,7 +64,7 @@ def likeliest(
     for (i, _), one in zip(starts, shared(tried, starts), strict=True):
         of_family.setdefault(i, []).append(one)
     best = sorted(of_family.values(), key=lambda found: min(left for left, _ in found))
-    return [term for found in best[:count] for left, term in found if math.isfinite(left)]
+    return [term for found in best for left, term in found if math.isfinite(left)][:count]
 
 
 def _begun(fitter: Stepped, model: Fitted) -> Callable[[Sequence[Term]], list[Term]]:

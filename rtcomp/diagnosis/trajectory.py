@@ -132,9 +132,13 @@ class Trajectory(Fitter):
     def _relative(self, residual: Floats) -> float:
         return float(np.sqrt(np.sum(residual[self.rows] ** 2) / max(self._power, 1e-300)))
 
-    def above_noise(self, model: Fitted) -> float:
+    def louder(self, model: Fitted) -> float:
+        """See `Fitter`: no louder, so short a window tells no spectrum."""
+        return 1.0
+
+    def above_noise(self, model: Fitted, louder: float = 1.0) -> float:
         """See `Fitter`: a reading and that at the window's begin are both noisy."""
-        noise = 2.0 * (self.balance.noise.rms / self.scale) ** 2 * np.count_nonzero(self.rows)
+        noise = 2.0 * (louder * self.balance.noise.rms / self.scale) ** 2 * np.count_nonzero(self.rows)
         return float(np.sqrt(max(self.relative(model) ** 2 - noise / max(self._power, 1e-300), 0.0)))
 
     def has_offset(self, model: Fitted) -> bool:

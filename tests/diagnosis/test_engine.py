@@ -110,3 +110,17 @@ def test_emps_ends_below_its_authors_refit() -> None:
     done = diagnose(Stage.load(shipped("emps_belief.yaml")), [read(path, columns)])
     assert "asymmetric-viscous-friction" in {n for e in done.effects for n in e.names}
     assert done.fit.after < 0.0311
+
+
+@pytest.mark.slow
+def test_hysteresis_of_the_bouc_wen_benchmark_is_named_from_a_linear_belief() -> None:
+    """Its stage says nothing of the noise, and a filter near half the rate hides how much there is."""
+    folder = Path(os.environ.get("RTCOMP_SHARED", Path(__file__).parents[3] / "shared/data"))
+    path = folder / "real/bouc-wen/train.csv.gz"
+    if not path.is_file():
+        pytest.skip(f"needs the Bouc-Wen benchmark's recording at {path}")
+    section = {"mass": 2.0, "viscous": 10.0, "force_constant": 1.0, "voltage_limit": 1000.0}
+    spring = {"name": "parallel-spring", "stiffness": 1e5}
+    believed = Stage.from_dict({"stage": {**section, "effects": [spring]}})
+    done = diagnose(believed, [read(path, {"voltage": "force"})])
+    assert [e.names for e in done.effects] == [("bouc-wen",)]
