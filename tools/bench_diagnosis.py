@@ -163,12 +163,17 @@ def pairs(seconds: float, folder: Path) -> list[Figure]:
         write_csv(folder / "run.csv", columns, True)
         shown = command(folder, "run.csv", belief)
         shutil.rmtree(folder / "out")
-        said = re.search("(Missing: |Something |Nothing |No physics )[^\r]*", shown.text)
         what = " and ".join(str(e["name"]) for e in effects)
-        found.append(
-            Figure(f"{seconds:g} s at 1 kHz, {what}", shown.seconds, "s", "<= 60", said[0] if said else "")
-        )
+        found.append(Figure(f"{seconds:g} s at 1 kHz, {what}", shown.seconds, "s", "<= 60", verdict(shown)))
     return found
+
+
+def verdict(shown: Shown) -> str:
+    """Return the sentence in which a diagnosis ended, with a word where its budget cut it short."""
+    said = re.search("(Missing: |Something |Nothing |No physics )[^\r]*", shown.text)
+    if said is None:
+        raise SystemExit(f"bench_diagnosis: no verdict in what the command printed:\n{shown.text}")
+    return said[0] + (" (cut short)" if "not tried within" in shown.text else "")
 
 
 def pace(seconds: float, folder: Path) -> list[Figure]:
@@ -178,7 +183,6 @@ def pace(seconds: float, folder: Path) -> list[Figure]:
     command(folder, "run.csv", belief)  # kernels compiled, once for all
     shutil.rmtree(folder / "out")
     shown = command(folder, "run.csv", belief)
-    named = shown.text[shown.text.index("Missing: ") :].split("\r")[0]
     what = f"{seconds:g} s at 1 kHz"
     return [
         Figure(
@@ -188,7 +192,7 @@ def pace(seconds: float, folder: Path) -> list[Figure]:
             "<= 2",
             "process start included",
         ),
-        Figure(f"{what}: everything", shown.seconds, "s", "<= 60", named),
+        Figure(f"{what}: everything", shown.seconds, "s", "<= 60", verdict(shown)),
     ]
 
 
@@ -211,12 +215,11 @@ def fast(folder: Path, minutes: int, rate: float = 1e4, stretch: float = 60.0) -
                     part += 5e-9 * chance.standard_normal(rows)
                 file[name][k * rows : (k + 1) * rows] = part
     shown = command(folder, "fast.h5", belief)
-    named = shown.text[shown.text.index("Missing: ") :].split("\r")[0]
     what = f"{minutes:g} min at {rate / 1000:g} kHz"
     return [
         Figure(f"{what}: memory", shown.peak_bytes / 1e9, "GB", "<= 4", f"{minutes * rows} rows"),
         Figure(f"{what}: where, on the terminal after", shown.when["Where "], "s"),
-        Figure(f"{what}: everything", shown.seconds, "s", "", named),
+        Figure(f"{what}: everything", shown.seconds, "s", "", verdict(shown)),
     ]
 
 

@@ -46,6 +46,8 @@ class Search:
     """What was found and not kept, and why."""
     doubted: bool = False
     """Whether the search ended because its objective was doubted."""
+    elsewhere: bool = False
+    """Whether friction is settled on another model than the chosen one."""
 
 
 def search(
@@ -79,8 +81,9 @@ def search(
         if judged is None or judged.null is None:
             break
         null = judged.null
-        before = (found.chosen, found.null, found.beside, found.alternatives)
+        before = (found.chosen, found.null, found.beside, found.alternatives, found.elsewhere)
         found.chosen, found.null, found.beside = beam[0], null, judged.candidates or None
+        found.elsewhere = False
         found.alternatives = [g for g in grown if len(g.terms) == len(beam[0].terms) and g is not beam[0]]
         if step == 0:
             found.screened = _table(judged.candidates, judged.screened, null)
@@ -89,7 +92,7 @@ def search(
             break
         if time.monotonic() > ends:
             if short:  # of a step that was cut, only a model that leaves nothing is sure
-                found.chosen, found.null, found.beside, found.alternatives = before
+                found.chosen, found.null, found.beside, found.alternatives, found.elsewhere = before
             else:
                 found.not_tried.append(_further(found.chosen))
             break
@@ -115,6 +118,8 @@ def search(
         if doubted is not None and doubted(beam[0]):
             found.doubted = True
             break
+    if found.elsewhere:
+        _settled_on_chosen(fitter, found, ends)
     _solid(fitter, found)
     return found
 
@@ -162,6 +167,15 @@ def _solid(fitter: Fitter, found: Search) -> None:
         found.chosen, found.alternatives, found.beside = fitter.fit(kept, found.chosen), [], None
 
 
+def _settled_on_chosen(fitter: Fitter, found: Search, ends: float) -> None:
+    """Refit the chosen model after friction was settled on one that was not kept: numbers of units moved."""
+    if time.monotonic() < ends:
+        settle(fitter, found.chosen.terms)
+    found.baseline = fitter.fit([])
+    found.chosen = fitter.fit(found.chosen.terms, found.chosen)
+    found.alternatives = [fitter.fit(g.terms, g) for g in found.alternatives]
+
+
 def _resettled(
     fitter: Fitter,
     found: Search,
@@ -175,7 +189,7 @@ def _resettled(
     Of the models that were `grown`, those that come near the best. Its own numbers were bent as well, so both
     are settled in turn, as long as the error falls.
     """
-    best, left = beam[0], math.inf
+    best, left, found.elsewhere = beam[0], math.inf, True
     while best.sse < (1.0 - LEAST_GAIN) ** 2 * left and time.monotonic() < ends:
         left = best.sse
         settle(fitter, best.terms)
