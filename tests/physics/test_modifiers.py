@@ -180,6 +180,18 @@ def test_a_gear_is_loaded_from_its_other_side_too():
     assert force(x, both, model=model, drive=20.0)[-1] == pytest.approx(plain + 1.0, rel=2e-3)
 
 
+def test_the_level_grows_by_the_square_of_the_load_over_it():
+    model = at_one_level("maxwell-slip")
+    x = np.linspace(0, 4e-4, 40_001)
+    plain = force(x, model=model)[-1]
+    square = effect("load-dependent-friction", form="quadratic", coefficient=0.05, external=0.1)
+    grown = 0.05 * 20.0**2 / plain
+    assert force(x, square, model=model, drive=-20.0)[-1] == pytest.approx(plain + grown, rel=2e-3)
+    weight = effect("gravity", force=-20.0)
+    both = force(x, weight, square, model=model, drive=20.0)[-1]
+    assert both == pytest.approx(plain + 3.0 * grown, rel=2e-3)
+
+
 # stiction-ageing
 
 

@@ -111,6 +111,7 @@ def test_recording_survives_kills(tmp_path: Path, victims: list[Victim]) -> None
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 @pytest.mark.parametrize("what", ["loop", "recorder", "both"])
 def test_recording_survives_twenty_kills(tmp_path: Path, victims: list[Victim], what: str) -> None:
     missing = kill_at_random(victims, tmp_path, [what] * 20, 3.0)
