@@ -190,7 +190,8 @@ def _candidate(
 
 def _finite(candidate: Candidate) -> Candidate | None:
     """Return the candidate where its columns are finite and not all nothing."""
-    power = float(np.sum(candidate.columns**2))
+    with np.errstate(over="ignore"):  # what runs away is no candidate
+        power = float(np.sum(candidate.columns**2))
     return candidate if np.isfinite(power) and power > 0.0 else None
 
 
