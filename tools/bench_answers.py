@@ -226,7 +226,8 @@ def drawn(count: int, seed: int, folder: Path) -> list[Pair]:
         family, believed, columns = cases[i % len(cases)]
         stage, done = copy.deepcopy(believed), []
         for part, ways in ((stage, STAGES), (columns, RECORDINGS)):
-            times = int(np.sum(chance.random() < (ONCE, TWICE)))
+            share = chance.random()
+            times = int(share < ONCE) + int(share < TWICE)
             for way in chance.choice(len(ways), size=times, replace=False):
                 done.append(ways[way].__name__)
                 if part is stage:

@@ -92,7 +92,8 @@ def answer(
         [] if verdict == "consistent" else locate(view, before, after if named else None, seed, believed.axis)
     )
     beside = found.beside if final is found.chosen else None
-    seen = [] if late and beside is None else sights(fitter, final, found.null, beside)
+    blind = found.cut or (late and beside is None)
+    seen = [] if blind else sights(fitter, final, found.null, beside)
     names = {n for e in named for n in e.names}
     return Diagnosis(
         verdict,

@@ -7,6 +7,8 @@ parameter has no unit, it states start values.
 from __future__ import annotations
 
 import itertools
+import math
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -74,11 +76,17 @@ def _denied(balance: ForceBalance, number: str) -> bool:
 
 
 def candidates(
-    fitter: Fitter, fitted: Fitted, taken: Sequence[str] = (), *, events: bool = False
+    fitter: Fitter,
+    fitted: Fitted,
+    taken: Sequence[str] = (),
+    *,
+    events: bool = False,
+    ends: float = math.inf,
 ) -> list[Candidate]:
     """Return every candidate beside a fitted model, with the columns it would add to it.
 
-    With `events`, those only that happen once, at a moment that the residual shows.
+    With `events`, those only that happen once, at a moment that the residual shows. Those not made until the
+    time `ends` (time.monotonic) are left out; every effect's first start comes before the others.
     """
     balance = fitter.balance
     scales = Scales.of(fitter, fitted)
@@ -94,7 +102,7 @@ def candidates(
     points = {k: list(_points(k, scales, fitter)) for k in kinds}
 
     def make(item: tuple[type[Effect], tuple[Entry, str]]) -> Candidate | None:
-        return _candidate(fitter, fitted, *item)
+        return None if time.monotonic() > ends else _candidate(fitter, fitted, *item)
 
     # What changes nothing at its first point (friction, where there is none) is not tried at the others.
     first = shared(make, [(kind, found[0]) for kind, found in points.items() if found])

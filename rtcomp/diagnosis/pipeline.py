@@ -18,7 +18,7 @@ from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.result import Diagnosis, Place
-from rtcomp.diagnosis.selection import Look, Search, look, search
+from rtcomp.diagnosis.selection import LOOKED, Look, Search, look, search, until
 from rtcomp.diagnosis.settings import BUDGET
 from rtcomp.diagnosis.sticking import MUCH, part_untold
 from rtcomp.diagnosis.trajectory import Trajectory
@@ -75,7 +75,7 @@ def _diagnosed(
     say: Progress = progress or (lambda _part, _what: None)
     ends = time.monotonic() + budget
     say(0.0, "balance")
-    objectives = _objectives(stage, recordings, held)
+    objectives = _objectives(stage, recordings, held, ends - (1.0 - SEARCH) * budget)
     if time.monotonic() > ends:
         raise RtcompError(f"the budget of {budget:g} s ended before the stage was refitted; give it more")
     balance, base = objectives[0].balance, objectives[0].base
@@ -130,7 +130,9 @@ class Objective:
         return self.fitter.balance
 
 
-def _objectives(stage: Stage, recordings: Sequence[Recording], held: bool | None) -> list[Objective]:
+def _objectives(
+    stage: Stage, recordings: Sequence[Recording], held: bool | None, ends: float
+) -> list[Objective]:
     """Return the objective of each way to take the command, the better first.
 
     A loop holds its command from row to row. Where there is no reference the command may be a measured signal
@@ -148,7 +150,9 @@ def _objectives(stage: Stage, recordings: Sequence[Recording], held: bool | None
         made.append(Objective(fitter, with_offset(fitter, base)))
     if len(made) == 1:
         return made
-    looked = [replace(one, first=look(one.fitter, one.base)) for one in made]
+    shares = (0.5 * LOOKED, LOOKED / (2.0 - LOOKED))  # of what is left each time: as long for both
+    pairs = zip(made, shares, strict=True)
+    looked = [replace(one, first=look(one.fitter, one.base, until(ends, share))) for one, share in pairs]
     return sorted(looked, key=_left_beside)
 
 

@@ -23,6 +23,8 @@ from rtcomp.diagnosis.significance import Null
 
 NEAR = 1.0
 """Logarithm of the error over the best one's, up to which a model is kept as an alternative."""
+LOOKED = 0.5
+"""Part of the time left in which candidates are looked at; the rest is for those that are fitted in full."""
 
 Say = Callable[[float, str], None]
 
@@ -41,6 +43,8 @@ class Search:
     """Models with one entry of the chosen one replaced by another effect."""
     screened: list[tuple[str, float, float]] = field(default_factory=list)
     """Name, gain and p-value of each candidate beside the baseline."""
+    cut: bool = False
+    """Whether there was no time to look at all candidates, so that the null is of a few of them."""
     not_tried: list[str] = field(default_factory=list)
     dropped: list[str] = field(default_factory=list)
     """What was found and not kept, and why."""
@@ -74,7 +78,7 @@ def search(
         while beam and judged is None:
             late = step > 0 and time.monotonic() > ends
             at_hand = first if step == 0 else None
-            seen = _judged(fitter, beam[0], seed + step, say, at_hand, late=late)
+            seen = _judged(fitter, beam[0], seed + step, say, at_hand, until(ends, LOOKED), late=late)
             judged = _sound(seen, parents[id(beam[0])])
             if judged is None:
                 beam.pop(0)
@@ -83,8 +87,9 @@ def search(
         null = judged.null
         before = (found.chosen, found.null, found.beside, found.alternatives, found.elsewhere)
         found.chosen, found.null, found.beside = beam[0], null, judged.candidates or None
-        found.elsewhere = False
+        found.elsewhere, found.cut = False, judged.cut
         found.alternatives = [g for g in grown if len(g.terms) == len(beam[0].terms) and g is not beam[0]]
+        _skipped(found, judged.cut)
         if step == 0:
             found.screened = _table(judged.candidates, judged.screened, null)
         done = null.settled(judged.gain, float(beam[0].errors.sum()), LEVEL)
@@ -97,8 +102,7 @@ def search(
                 found.not_tried.append(_further(found.chosen))
             break
         grown, short = _grown(fitter, beam, judged, null.p_value(judged.gain) < LEVEL, ends)
-        if short:
-            found.not_tried.append(f"some of {_further(found.chosen)}")
+        _skipped(found, short)
         fit = [g for g in grown if accepted(fitter, g, _parent(g, beam), null, everything)]
         good = _distinct(sorted(fit, key=score))[:BEAM]
         parents = {}
@@ -138,7 +142,7 @@ def _grown(
         if 2.0 * moment - began > ends:
             return grown, True
         began = moment
-        beside = look(fitter, other)
+        beside = look(fitter, other, ends)
         grown += grow(fitter, other, beside.candidates, beside.screened, ends)
     return grown, time.monotonic() > ends
 
@@ -148,6 +152,13 @@ def _better(fitter: Fitter, model: Fitted, chosen: Fitted, null: Null, everythin
     if len(model.terms) > len(chosen.terms):
         return accepted(fitter, model, chosen, null, everything)
     return score(model) < score(chosen)
+
+
+def _skipped(found: Search, cut: bool) -> None:
+    """Say that some effects beside the chosen model were not tried, where time `cut` them off."""
+    what = f"some of {_further(found.chosen)}"
+    if cut and what not in found.not_tried:
+        found.not_tried.append(what)
 
 
 def _further(model: Fitted) -> str:
@@ -210,6 +221,8 @@ class Look:
     screened: list[Screened]
     screen: Screen
     null: Null | None
+    cut: bool = False
+    """Whether there was no time for all candidates."""
 
     @property
     def gain(self) -> float:
@@ -217,15 +230,24 @@ class Look:
         return max((s.gain for s in self.screened), default=0.0)
 
 
-def look(fitter: Fitter, model: Fitted) -> Look:
-    """Look at all candidates beside a model, without their null distribution."""
-    made = candidates(fitter, model, ent.names(model.entries))
+def until(ends: float, share: float) -> float:
+    """Return the time at which a `share` of that which is left up to `ends` has passed (time.monotonic)."""
+    now = time.monotonic()
+    return now + share * max(ends - now, 0.0)
+
+
+def look(fitter: Fitter, model: Fitted, ends: float = math.inf) -> Look:
+    """Look at all candidates beside a model, or those made in time, without their null distribution."""
+    made = candidates(fitter, model, ent.names(model.entries), ends=ends)
+    cut = time.monotonic() > ends
     screen = Screen(made, fitter.block, fitter.blocks, fitter.use)
-    return Look(made, screen.gains(free_columns(model), model.residual), screen, None)
+    return Look(made, screen.gains(free_columns(model), model.residual), screen, None, cut)
 
 
-def _judged(fitter: Fitter, model: Fitted, seed: int, say: Say, first: Look | None, *, late: bool) -> Look:
-    """Return the look beside a model with its null distribution.
+def _judged(
+    fitter: Fitter, model: Fitted, seed: int, say: Say, first: Look | None, ends: float, *, late: bool
+) -> Look:
+    """Return the look beside a model, which `ends` in time, with its null distribution.
 
     `first` is that look, where it was taken before; where it is too `late` for one, only what chance leaves
     is looked at.
@@ -235,7 +257,7 @@ def _judged(fitter: Fitter, model: Fitted, seed: int, say: Say, first: Look | No
     say(0.0, what)
     if late:
         first = Look([], [], Screen([], fitter.block, fitter.blocks, fitter.use), None)
-    seen = first or look(fitter, model)
+    seen = first or look(fitter, model, ends)
     say(0.5, what)
     return replace(seen, null=null_of(fitter, model, seen.screen, seen.gain, seed))
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.noise import Noise
 from rtcomp.errors import RecordingError
 from rtcomp.stage.stage import Stage
 
@@ -31,7 +32,7 @@ class Reserved:
             )
 
     def judge(self, stages: Mapping[str, Stage]) -> dict[str, float]:
-        """Return the relative force error (rms over rms) of each stage, and as ``noise`` the sensor's.
+        """Return the relative force error (rms over rms) of each stage, and as ``noise`` the sensor's alone.
 
         Raises RuntimeError when asked again: what is asked twice is selected on.
         """
@@ -46,5 +47,7 @@ class Reserved:
             drive, needed = b.both_sides(stage)
             power = power or float(np.mean(drive[rows] ** 2))
             found[name] = float(np.sqrt(np.mean((drive - needed)[rows] ** 2) / max(power, 1e-300)))
-        found["noise"] = float(np.sqrt(b.noise_power / max(power, 1e-300)))
+        noise = float(np.sqrt(b.noise_power / max(power, 1e-300)))
+        # Where none is stated, it is the most that the reading allows: what a stage leaves allows no more.
+        found["noise"] = noise if Noise.stated(b.stage) > 0.0 else min(noise, *found.values())
         return found

@@ -39,7 +39,7 @@ COGGING = {"name": "cogging", "amplitude": 0.5, "period": 1.3e-4, "phase": 0.4}
 
 def diagnosed(hidden: dict[str, Any] | None, **mechanics: Any) -> Diagnosis:
     stage, recording = recorded(hidden, **mechanics)
-    return diagnose(stage, [recording])
+    return diagnose(stage, [recording], budget=300.0)
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +114,7 @@ def emps(budget: float) -> Diagnosis:
 def test_emps_ends_below_its_authors_refit() -> None:
     done = emps(300.0)
     assert "asymmetric-viscous-friction" in {n for e in done.effects for n in e.names}
-    assert done.fit.after < 0.0311
+    assert done.fit.floor <= done.fit.after < 0.0311
 
 
 @pytest.mark.slow
@@ -135,5 +135,5 @@ def test_hysteresis_of_the_bouc_wen_benchmark_is_named_from_a_linear_belief() ->
     section = {"mass": 2.0, "viscous": 10.0, "force_constant": 1.0, "voltage_limit": 1000.0}
     spring = {"name": "parallel-spring", "stiffness": 1e5}
     believed = Stage.from_dict({"stage": {**section, "effects": [spring]}})
-    done = diagnose(believed, [read(path, {"voltage": "force"})])
+    done = diagnose(believed, [read(path, {"voltage": "force"})], budget=300.0)
     assert [e.names for e in done.effects] == [("bouc-wen",)]

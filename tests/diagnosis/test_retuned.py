@@ -114,7 +114,7 @@ def test_a_mass_that_is_another_is_told_with_an_interval_that_holds_it() -> None
 def test_a_force_constant_that_is_another_is_told_as_such_and_moves_alike() -> None:
     true, believed = axis(force_constant=4.0 / 1.08), axis()
     motion = run(true, there_and_back(8.0))
-    done = diagnose(believed, [motion])
+    done = diagnose(believed, [motion], budget=300.0)
     assert done.verdict == "retuned"
     (told,) = done.retuned
     assert told.parameter == "force_constant"
@@ -127,7 +127,7 @@ def test_a_force_constant_that_is_another_is_told_as_such_and_moves_alike() -> N
 def test_the_size_of_a_believed_effect_that_is_another_is_told() -> None:
     cogging = {"name": "cogging", "amplitude": 0.5, "period": 1e-4, "phase": 0.4}
     believed = axis(effects=[{**cogging, "amplitude": 0.4}])
-    done = diagnose(believed, [run(axis(effects=[cogging]), there_and_back(8.0))])
+    done = diagnose(believed, [run(axis(effects=[cogging]), there_and_back(8.0))], budget=300.0)
     assert done.verdict == "retuned"
     (told,) = [r for r in done.retuned if r.parameter == "cogging.amplitude"]
     assert told.before == 0.4 and told.after.low <= 0.5 <= told.after.high

@@ -12,7 +12,7 @@ def test_what_is_retuned_and_named_has_the_units_of_the_axis() -> None:
     spring = {"name": "parallel-spring", "stiffness": 4000.0}
     hidden = {**STAGE["stage"], "axis": "rotary", "mass": 2.5, "effects": [spring]}
     recording = run(Stage.from_dict({**STAGE, "stage": hidden}), there_and_back(20.0))
-    found = diagnose(stage(axis="rotary"), [recording])
+    found = diagnose(stage(axis="rotary"), [recording], budget=300.0)
     assert {r.parameter: r.after.unit for r in found.retuned}["mass"] == "kg m^2"
     (named,) = found.effects
     assert named.names[0] == "parallel-spring"

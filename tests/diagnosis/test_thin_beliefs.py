@@ -31,7 +31,7 @@ def test_a_diagnosis_of_a_thin_belief_comes_to_its_end(
     thin = Stage.from_dict({"stage": NEEDED | friction, "rate": 1000.0})
     assert thin.friction is None
     admit(thin, [recording])
-    found = diagnose(thin, [recording])
+    found = diagnose(thin, [recording], budget=300.0)
     assert found.verdict in ("missing-physics", "unexplained")
     assert found.fit.retuned < 0.3 * found.fit.before
     assert all(r.before == 0.0 for r in found.retuned if r.parameter not in ("mass", "force_constant"))
@@ -55,5 +55,5 @@ def test_a_measured_motor_of_which_only_the_inertia_is_believed(tmp_path: Path) 
     )  # fmt: skip
     motor = replace(read(tmp_path / "motor.csv"), path=Path("motor.csv"))
     admit(thin, [motor])
-    found = diagnose(thin, [motor])
+    found = diagnose(thin, [motor], budget=300.0)
     assert found.verdict in ("missing-physics", "unexplained")

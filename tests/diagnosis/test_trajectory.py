@@ -193,7 +193,7 @@ def test_friction_that_grows_with_the_load_is_named(loaded: list[Recording]) -> 
 @pytest.mark.slow
 def test_a_pendulum_as_believed_is_left_in_peace() -> None:
     plant = stage(friction=[{"stiffness": 80.0, "reach": 1.0e-3}])
-    done = diagnose(plant, both(plant))
+    done = diagnose(plant, both(plant), budget=300.0)
     assert done.position is not None
     assert done.verdict in ("consistent", "retuned") and not done.effects
     assert "sensor-delay" in done.not_observable
