@@ -123,7 +123,7 @@ def search(
             found.doubted = True
             break
     if found.elsewhere:
-        _settled_on_chosen(fitter, found, ends)
+        _settled_on_chosen(fitter, found)
     _solid(fitter, found)
     return found
 
@@ -178,10 +178,9 @@ def _solid(fitter: Fitter, found: Search) -> None:
         found.chosen, found.alternatives, found.beside = fitter.fit(kept, found.chosen), [], None
 
 
-def _settled_on_chosen(fitter: Fitter, found: Search, ends: float) -> None:
+def _settled_on_chosen(fitter: Fitter, found: Search) -> None:
     """Refit the chosen model after friction was settled on one that was not kept: numbers of units moved."""
-    if time.monotonic() < ends:
-        settle(fitter, found.chosen.terms)
+    settle(fitter, found.chosen.terms)
     found.baseline = fitter.fit([])
     found.chosen = fitter.fit(found.chosen.terms, found.chosen)
     found.alternatives = [fitter.fit(g.terms, g) for g in found.alternatives]
