@@ -257,12 +257,15 @@ def diagnosed(pair: Pair, budget: float) -> Outcome:
     except subprocess.TimeoutExpired:
         return Outcome(pair, -1, time.perf_counter() - began, "", f"did not end within {PATIENCE:g} budgets")
     seconds = time.perf_counter() - began
-    verdict = str(json.loads(run.stdout)["verdict"]) if run.returncode == 0 else ""
+    try:
+        verdict = str(json.loads(run.stdout)["verdict"]) if run.returncode == 0 else ""
+    except (ValueError, KeyError):
+        verdict = ""
     return Outcome(pair, run.returncode, seconds, verdict, run.stderr)
 
 
 @click.command()
-@click.option("--pairs", "count", type=click.IntRange(1), default=500, show_default=True)
+@click.option("--pairs", "count", type=click.IntRange(1), default=60, show_default=True)
 @click.option("--seed", default=1, show_default=True)
 @click.option("--budget", default=10.0, show_default=True, help="Of each diagnosis, in s.")
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="At the same time.")

@@ -85,7 +85,7 @@ def search(
         if judged is None or judged.null is None:
             break
         null = judged.null
-        before = (found.chosen, found.null, found.beside, found.alternatives, found.elsewhere)
+        before = replace(found)
         found.chosen, found.null, found.beside = beam[0], null, judged.candidates or None
         found.elsewhere, found.cut = False, judged.cut
         found.alternatives = [g for g in grown if len(g.terms) == len(beam[0].terms) and g is not beam[0]]
@@ -97,7 +97,7 @@ def search(
             break
         if time.monotonic() > ends:
             if short:  # of a step that was cut, only a model that leaves nothing is sure
-                found.chosen, found.null, found.beside, found.alternatives, found.elsewhere = before
+                found = replace(before, not_tried=found.not_tried)
             else:
                 found.not_tried.append(_further(found.chosen))
             break

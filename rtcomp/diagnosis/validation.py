@@ -7,7 +7,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.noise import Noise
 from rtcomp.errors import RecordingError
 from rtcomp.stage.stage import Stage
 
@@ -32,7 +31,7 @@ class Reserved:
             )
 
     def judge(self, stages: Mapping[str, Stage]) -> dict[str, float]:
-        """Return the relative force error (rms over rms) of each stage, and as ``noise`` the sensor's alone.
+        """Return the relative force error (rms over rms) of each stage, and as ``noise`` the sensor's.
 
         Raises RuntimeError when asked again: what is asked twice is selected on.
         """
@@ -47,7 +46,5 @@ class Reserved:
             drive, needed = b.both_sides(stage)
             power = power or float(np.mean(drive[rows] ** 2))
             found[name] = float(np.sqrt(np.mean((drive - needed)[rows] ** 2) / max(power, 1e-300)))
-        noise = float(np.sqrt(b.noise_power / max(power, 1e-300)))
-        # Where none is stated, it is the most that the reading allows: what a stage leaves allows no more.
-        found["noise"] = noise if Noise.stated(b.stage) > 0.0 else min(noise, *found.values())
+        found["noise"] = float(np.sqrt(b.noise_power / max(power, 1e-300)))
         return found

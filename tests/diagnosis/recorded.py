@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from rtcomp.kernels import Floats
 from rtcomp.recording.reader import Recording
@@ -76,3 +78,12 @@ def cut(recording: Recording, first: int, last: int) -> Recording:
 def of_axis(recording: Recording, axis: str) -> Recording:
     """The recording as our own files have it, of a stage with that axis."""
     return replace(recording, metadata={"stage": json.dumps(stage(axis=axis).to_dict())})
+
+
+def measured(name: str) -> Path:
+    """Return where a measured recording is, a file or a folder; skip the test where it is not at hand."""
+    shared = Path(os.environ.get("RTCOMP_SHARED", Path(__file__).parents[3] / "shared/data"))
+    path = shared / "real" / name
+    if not path.exists():
+        pytest.skip(f"needs the measured recording {path}; set RTCOMP_SHARED to the folder that holds real/")
+    return path

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from recorded import measured
 
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import baseline
@@ -202,10 +201,7 @@ def test_a_pendulum_as_believed_is_left_in_peace() -> None:
 @pytest.mark.slow
 def test_a_measured_servo_is_not_given_a_wrong_name() -> None:
     """Its authors know it to have friction by load, and more: that is named, or nothing."""
-    folder = Path(os.environ.get("RTCOMP_SHARED", Path(__file__).parents[3] / "shared/data"))
-    folder = folder / "real/servo-pendulum"
-    if not folder.is_dir():
-        pytest.skip(f"needs the recordings of a servo with a pendulum at {folder}")
+    folder = measured("servo-pendulum")
     columns = {"voltage": "duty", "enabled": "torque_enabled"}
 
     def gain(number: int) -> list[Recording]:
