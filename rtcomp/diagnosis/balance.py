@@ -109,7 +109,7 @@ class ForceBalance(Signals):
         self.blocks = int(np.clip(count, FEWEST, MOST))
         self.block = np.arange(sum(kept)) * self.blocks // sum(kept)
         time = self.plain([s.time for s in self.data.segments])
-        stepped = {int(self.block[np.argmin(np.abs(time - at))]) for at, _ in self.data.jumps}
+        stepped = {int(self.block[np.argmin(np.abs(time - j.time))]) for j in self.data.jumps}
         self._reserved = reserved_blocks(self.blocks, stepped, self._furthest())
 
     def _furthest(self) -> set[int]:
@@ -251,8 +251,9 @@ class ForceBalance(Signals):
                 parts.append(table[:, 3:-3])
                 continue
             kept, rows = self._whitening.filtered(segment), self._whitening.rows(segment)
-            white = filtered(table[:, kept], self.data.rate, self._whitening.response, noisy=True)
-            parts.append(white[:, rows.start - kept.start : rows.stop - kept.start : rows.step])
+            wanted = slice(rows.start - kept.start, rows.stop - kept.start, rows.step)
+            response = self._whitening.response
+            parts.append(filtered(table[:, kept], self.data.rate, response, noisy=True, wanted=wanted))
         return np.concatenate(parts, axis=1)
 
     def both_sides(self, stage: Stage) -> tuple[Floats, Floats]:

@@ -84,13 +84,14 @@ def units_along(
     w[GRAIN] = grain
     base = np.array([stage.mass, stage.force_constant])
     deflection = np.zeros(len(reaches)) if start is None else start.copy()
+    smooth = parts > needed == 1  # damping is, between rows
     _along(
-        program.steps, program.p, program.s, w, base, motion, parts, len(before), len(bent), weights, reaches,
-        deflection, out, mean,
+        program.steps, program.p, program.s, w, base, motion, parts, smooth, len(before), len(bent), weights,
+        reaches, deflection, out, mean,
     )  # fmt: skip
     for table in (out, mean):
         table[:, 2] = (table[:, 2] - table[:, 1]) / np.log1p(FASTER)
-    if parts > needed == 1:  # damping is smooth between rows
+    if smooth:
         mean[:, :SPEED_UNITS] = around_rows(out[:, :SPEED_UNITS])
     return around_rows(out) if parts == 1 else mean
 
@@ -115,6 +116,7 @@ def _along(
     base: Floats,
     motion: Floats,
     parts: int,
+    smooth: bool,
     first: int,
     bent: int,
     weights: Floats,
@@ -125,6 +127,8 @@ def _along(
 ) -> None:
     """Fill `out` with forces at the rows: units of speed are the effects from `first` on.
 
+    Where these are `smooth` between rows, they are only at the ends of rows.
+
     Where rows are cut into `parts`, also their `mean` around each row: over the row before it weighed by what
     has passed of that, and over the row after it by what is to come. After those units come `bent` effects
     that bend branches. What else changes the whole of friction is shared out among the elements in proportion
@@ -132,6 +136,7 @@ def _along(
     """
     count = weights.size
     then = first + SPEED_UNITS
+    alone = first == 0 and then == steps[0]  # nothing that changes friction, or asks for the whole of it
     level = stiffness = 0.0
     for i in range(count):
         level += weights[i] * reaches[i]
@@ -143,32 +148,68 @@ def _along(
             renew(w, base[0], base[1])
             w[GRIP_LEVEL], w[GRIP_STIFFNESS] = level, stiffness
             run_chain(steps, p, s, w, 0, first)
-            for i in range(SPEED_UNITS):
-                w[FRICTION] = 0.0
-                run_chain(steps, p, s, w, first + i, first + i + 1)
-                out[k, i] = w[FRICTION]
+            if j == parts or not smooth:
+                for i in range(SPEED_UNITS):
+                    w[FRICTION] = 0.0
+                    run_chain(steps, p, s, w, first + i, first + i + 1)
+                    out[k, i] = w[FRICTION]
             held = out[k, SPEED_UNITS:]
-            moved, longer, scale, softening = w[MOVED], w[REACH], w[SCALE], w[SOFTENS]
-            for i in range(count):
-                limit = reaches[i] * longer
-                deflection[i] = stretched(deflection[i], moved, limit)
-                held[i] = softened(deflection[i], limit, softening) * scale
-            total = 0.0
-            for i in range(count):
-                total += weights[i] * held[i]
-            # The whole is what the chain sees from here on, and at the next step.
-            w[GRIP], w[GRIP_LEVEL], w[GRIP_STIFFNESS] = total, level, stiffness
-            w[FRICTION] = total
-            if bent > 0 and level > 0.0:
-                _bend(steps, p, s, w, then, total, level, weights, reaches, held)
-            whole = w[FRICTION]
-            run_chain(steps, p, s, w, then + bent, steps[0])
-            if whole != 0.0 and w[FRICTION] != whole:
-                grown = w[FRICTION] / whole
-                for i in range(count):
-                    held[i] *= grown
+            _stretch(w[MOVED], w[REACH], w[SCALE], w[SOFTENS], reaches, deflection, held)
+            if not alone:
+                _whole(steps, p, s, w, then, bent, level, stiffness, weights, reaches, held)
             if parts > 1:
                 _share_out(mean, out, last, k, j, parts)
+
+
+@compiled
+def _stretch(
+    moved: float, longer: float, scale: float, softening: float, reaches: Floats, deflection: Floats,
+    held: Floats,
+) -> None:  # fmt: skip
+    """Move the stop elements on: their `deflection` (m), and what they hold by it."""
+    for i in range(reaches.size):
+        deflection[i] = stretched(deflection[i], moved, reaches[i] * longer)
+        held[i] = deflection[i] * scale
+    if softening != 0.0:
+        for i in range(reaches.size):
+            held[i] = softened(deflection[i], reaches[i] * longer, softening) * scale
+
+
+@compiled
+def _whole(
+    steps: np.ndarray,
+    p: Floats,
+    s: Floats,
+    w: Floats,
+    first: int,
+    bent: int,
+    level: float,
+    stiffness: float,
+    weights: Floats,
+    reaches: Floats,
+    held: Floats,
+) -> None:
+    """Change the whole of friction by the effects from `first` on, and what each element holds of it."""
+    total = 0.0
+    for i in range(weights.size):
+        total += weights[i] * held[i]
+    # The whole is what the chain sees from here on, and at the next step.
+    w[GRIP], w[GRIP_LEVEL], w[GRIP_STIFFNESS] = total, level, stiffness
+    w[FRICTION] = total
+    if bent > 0 and level > 0.0:
+        _bend(steps, p, s, w, first, total, level, weights, reaches, held)
+    whole = w[FRICTION]
+    run_chain(steps, p, s, w, first + bent, steps[0])
+    if whole != 0.0 and w[FRICTION] != whole:
+        grown = w[FRICTION] / whole
+        for i in range(weights.size):
+            held[i] *= grown
+
+
+@compiled
+def _third(of: Floats, mean: Floats) -> None:
+    for i in range(of.size):
+        mean[i] += of[i] / 3.0
 
 
 @compiled
@@ -178,16 +219,15 @@ def _share_out(mean: Floats, out: Floats, last: Floats, k: int, j: int, parts: i
     What comes after the last row is taken to be as before it.
     """
     end = mean.shape[0] - 1
+    if parts == 2:  # a parabola through both ends and the middle, weighed by the triangle
+        _third(out[k], mean[k])
+        if j == 1 and k > 0:
+            _third(out[k], mean[k - 1])
+        if j == 2 and k == end:
+            _third(out[k], mean[k])
+        return
     passed = (j - 0.5) / parts
     for i in range(out.shape[1]):
-        if parts == 2:  # a parabola through both ends and the middle, weighed by the triangle
-            third = out[k, i] / 3.0
-            mean[k, i] += third
-            if j == 1 and k > 0:
-                mean[k - 1, i] += third
-            if j == 2 and k == end:
-                mean[k, i] += third
-            continue
         share = 0.5 * (last[i] + out[k, i]) / parts
         last[i] = out[k, i]
         mean[k, i] += passed * share

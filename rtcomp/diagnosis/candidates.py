@@ -30,6 +30,8 @@ SMALL = 0.05
 """Size of a dimensionless parameter at which its first-order effect is looked at."""
 NOT_IN_PROPORTION = ("s", "V")
 """Units of what shifts or cuts a signal: far from neutral it does not act in proportion; tried there too."""
+LIKELY = 2
+"""Start values at which the further forms of an effect are looked at."""
 POINT = 1e-2
 """Relative size of a step that is taken to be first order."""
 
@@ -108,8 +110,43 @@ def candidates(
     first = shared(make, [(kind, found[0]) for kind, found in points.items() if found])
     shown = [c for c in first if c is not None]
     names = {c.name for c in shown}
-    rest = [(kind, point) for kind, found in points.items() for point in found[1:] if kind.name in names]
-    return [*shown, *(c for c in shared(make, rest) if c is not None)]
+    own = {kind: [p for p in found[1:] if _first_form(kind, p)] for kind, found in points.items()}
+    more = [(kind, point) for kind, found in own.items() for point in found if kind.name in names]
+    shown += [c for c in shared(make, more) if c is not None]
+    # A form differs in shape, not in where it is: the others are looked at where the first does most.
+    likely = _likely(fitted, shown, fitter.rows)
+    others = [
+        (kind, point)
+        for kind, found in points.items()
+        for point in found[1:]
+        if not _first_form(kind, point) and any(_alike(kind, point[0], e) for e in likely.get(kind.name, []))
+    ]
+    return [*shown, *(c for c in shared(make, others) if c is not None)]
+
+
+def _first_form(kind: type[Effect], point: tuple[Entry, str]) -> bool:
+    return point[0].get("form", "") in ("", *list(kind.forms)[:1])
+
+
+def _likely(fitted: Fitted, shown: Sequence[Candidate], rows: np.ndarray) -> dict[str, list[Entry]]:
+    """Return the start values of each effect that explain most beside a model, on some rows."""
+    span, _ = np.linalg.qr(np.concatenate([fitted.system.columns, fitted.tangents])[:, rows].T)
+    rest = fitted.residual[rows]
+    found: dict[str, list[tuple[float, Entry]]] = {}
+    for c in shown:
+        columns = c.columns[:, rows].T
+        beside, _ = np.linalg.qr(columns - span @ (span.T @ columns))
+        found.setdefault(c.name, []).append((float(np.sum((beside.T @ rest) ** 2)), c.term.entry))
+    return {
+        name: [entry for _, entry in sorted(all_of_it, key=lambda one: -one[0])[:LIKELY]]
+        for name, all_of_it in found.items()
+    }
+
+
+def _alike(kind: type[Effect], entry: Entry, other: Entry) -> bool:
+    """Tell whether two entries have equal values of all parameters that both have, but for phases."""
+    both = [p.name for p in kind.parameters if p.unit != ent.PHASE and p.name in entry and p.name in other]
+    return all(entry[name] == other[name] for name in both)
 
 
 def _points(kind: type[Effect], scales: Scales, fitter: Fitter) -> Iterator[tuple[Entry, str]]:

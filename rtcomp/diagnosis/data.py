@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rtcomp.diagnosis.jumps import jumps
+from rtcomp.diagnosis.jumps import MOST, Jump, jumps
 from rtcomp.diagnosis.stretches import LEAST_ROWS, stretches
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect
@@ -16,9 +16,9 @@ from rtcomp.recording.pieces import bridged
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.sensed import true_position
 
-MOST_ROWS = 64_000
+MOST_ROWS = 32_000
 """Rows of the recording that are used as they are; of longer ones windows are taken, evenly spread."""
-OVERSAMPLED = 10.0
+OVERSAMPLED = 5.0
 """Rate over the motion's bandwidth, from which on rows are averaged."""
 BEFORE = 10_000
 """Rows, at most, of the way to a window."""
@@ -82,9 +82,10 @@ class Data:
         return float(sum(s.time.size for s in self.segments)) / self.rate
 
     @cached_property
-    def jumps(self) -> list[tuple[float, float]]:
-        """Times (s) and sizes (m) of steps of the reading that are unlike those before and after them."""
-        return [j for s in self.as_recorded().segments for j in jumps(s.time, s.position)]
+    def jumps(self) -> list[Jump]:
+        """The clearest steps of the reading that are unlike those before and after them."""
+        found = [j for s in self.as_recorded().segments for j in jumps(s.time, s.position)]
+        return sorted(found, key=lambda j: -j.clear)[:MOST]
 
     def as_recorded(self) -> Data:
         """Return the rows that these are means of."""

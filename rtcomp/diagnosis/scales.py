@@ -151,7 +151,7 @@ def _moments(balance: ForceBalance, residual: Floats) -> Floats:
     A step stands between two rows of the recording, a residual within what the filter remembers of it.
     """
     time = balance.plain([s.time for s in balance.data.segments])
-    stepped = [at for at, _ in balance.data.jumps]
+    stepped = [j.time for j in balance.data.jumps]
     left, found = np.abs(residual), []
     apart = max(10, residual.size // 500)
     for _ in range(PEAKS):

@@ -22,7 +22,7 @@ from rtcomp.diagnosis.settings import BEAM, LEAST_GAIN, LEVEL, MOST_EFFECTS
 from rtcomp.diagnosis.significance import Null
 
 NEAR = 1.0
-"""Logarithm of the error over the best one's, up to which a model is kept as an alternative."""
+"""Logarithm of the error over the best one's, up to which a model is an alternative, and grown beside it."""
 LOOKED = 0.5
 """Part of the time left in which candidates are looked at; the rest is for those that are fitted in full."""
 
@@ -137,7 +137,8 @@ def _grown(
     """
     began = time.monotonic()
     grown = grow(fitter, beam[0], seen.candidates, seen.screened, ends)
-    for other in beam[1:] if others else []:
+    near = [m for m in beam[1:] if score(m) < score(beam[0]) + NEAR]
+    for other in near if others else []:
         moment = time.monotonic()
         if 2.0 * moment - began > ends:
             return grown, True

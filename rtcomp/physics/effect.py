@@ -172,6 +172,8 @@ class Effect:
     steady: ClassVar[bool] = False
     """Of the drive: whether its force stays as it is while the command is held. Forces beside the drive's,
     such as cogging's, do not count."""
+    averages: ClassVar[bool] = False
+    """Of the drive, where it remembers: whether what it gives over a step is the mean over that step."""
     bias: ClassVar[bool] = False
     """Whether it is a constant force on a linear axis."""
     stands_for: ClassVar[str] = ""

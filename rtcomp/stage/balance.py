@@ -111,7 +111,8 @@ def forces(
 def parts_of_drive(drive: Sequence[Effect]) -> int:
     """Return the parts of a row over which the force of `drive` is to be averaged."""
     varying = [e for e in drive if not e.steady]
-    return 1 if not varying else PARTS if any(e.initial_state().size for e in drive) else MIDDLES
+    ends = any(e.states and not e.averages for e in drive)
+    return 1 if not varying else PARTS if ends else MIDDLES
 
 
 def parts_of(chain: Sequence[Effect], row: float) -> int:

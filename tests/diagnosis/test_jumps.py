@@ -23,14 +23,14 @@ def moved(seed: int = 0, rows: int = 4000) -> tuple[np.ndarray, np.ndarray]:
 def test_a_jump_is_found_to_the_row(seed: int, row: int, sign: float) -> None:
     time, x = moved(seed)
     x[row:] += sign * 2e-6
-    at, size = jumps(time, x)[0]
+    at, size, _ = jumps(time, x)[0]
     assert time[row - 1] < at < time[row]
     assert size == pytest.approx(sign * 2e-6, rel=0.05)
 
 
 def test_a_smooth_motion_has_none() -> None:
     time, x = moved()
-    assert all(abs(size) < 1e-7 for _, size in jumps(time, x))
+    assert all(abs(j.size) < 1e-7 for j in jumps(time, x))
     assert jumps(time[:8], x[:8]) == []
 
 
@@ -43,10 +43,12 @@ def test_what_the_motion_does_stands_out_less_than_a_jump_of_a_few_counts(
     time = np.arange(4000) / 1000.0
     speed = 0.005 * zero_phase(np.sign(np.sin(6.0 * time)), 10.0, 1e3)
     x = np.cumsum(speed) / 1000.0 + 2e-8 * np.random.default_rng(seed).standard_normal(4000)
-    assert all(abs(size) < 9e-7 for _, size in jumps(time, np.round(x / 1e-7) * 1e-7))
+    assert all(abs(j.size) < 9e-7 for j in jumps(time, np.round(x / 1e-7) * 1e-7))
     x[row:] += sign * 2e-6
-    found = [size for at, size in jumps(time, np.round(x / 1e-7) * 1e-7) if time[row - 1] < at < time[row]]
-    assert found == [pytest.approx(sign * 2e-6, abs=5e-7)]
+    found = jumps(time, np.round(x / 1e-7) * 1e-7)
+    assert [j.size for j in found if time[row - 1] < j.time < time[row]] == [
+        pytest.approx(sign * 2e-6, abs=5e-7)
+    ]
 
 
 def test_a_step_that_the_controller_takes_back_is_no_outlier_but_a_spike_is() -> None:
