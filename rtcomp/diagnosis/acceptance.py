@@ -13,7 +13,7 @@ from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.intervals import told
-from rtcomp.diagnosis.other_forms import errors_beside
+from rtcomp.diagnosis.other_forms import errors_beside, in_any_form
 from rtcomp.diagnosis.settings import LEAST_GAIN, LEFT, LEVEL, NEGLIGIBLE
 from rtcomp.diagnosis.significance import Null, log_gain
 
@@ -99,6 +99,8 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
     """
     said = []
     louder = fitter.louder(chosen)
+    # A wave of any form is the same effect: what only makes its form another is not left.
+    beside = in_any_form(fitter, chosen, fitter.other_forms(chosen, waves=True))
     more = null is not None and null.p_of_error(float(chosen.errors.sum())) < LEVEL
     for i, span in enumerate(told(fitter, chosen)):
         why = "its size may be nothing" if span.nothing else ""
@@ -106,7 +108,7 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
         left = 1.0
         if not why:
             without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
-            left, there = (fitter.above_noise(model, louder) ** 2 for model in (chosen, without))
+            left, there = (fitter.above_noise(model, louder) ** 2 for model in (beside, without))
             left /= max(there, 1e-300)
             why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""
         said.append(Doubt(why, left))

@@ -29,6 +29,8 @@ from rtcomp.physics import Place
 from rtcomp.stage.balance import around_rows, forces, parts_of_drive
 from rtcomp.stage.stage import Stage
 
+LEAST_FORCE = 0.01
+"""Part of the drive's force (rms) that blocks must have to judge by."""
 FEWEST, MOST = 10, 25
 """Blocks of a recording: at least, at most."""
 
@@ -110,7 +112,13 @@ class ForceBalance(Signals):
         self.block = np.arange(sum(kept)) * self.blocks // sum(kept)
         time = self.plain([s.time for s in self.data.segments])
         stepped = {int(self.block[np.argmin(np.abs(time - j.time))]) for j in self.data.jumps}
-        self._reserved = reserved_blocks(self.blocks, stepped, self._furthest())
+        self._reserved = reserved_blocks(self.blocks, stepped, self._still(), self._furthest())
+
+    def _still(self) -> set[int]:
+        """Return the blocks in which the command hardly varies: they could judge nothing."""
+        volts = self.plain([s.voltage for s in self.data.segments])
+        least = LEAST_FORCE * float(np.std(volts))
+        return {k for k in range(self.blocks) if float(np.std(volts[self.block == k])) < least}
 
     def _furthest(self) -> set[int]:
         """Return the blocks in which command, position and speed are lowest and highest."""

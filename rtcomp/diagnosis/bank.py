@@ -89,7 +89,7 @@ def units_along(
         program.steps, program.p, program.s, w, base, motion, parts, smooth, len(before), len(bent), weights,
         reaches, deflection, out, mean,
     )  # fmt: skip
-    for table in (out, mean):
+    for table in (out,) if smooth else (out, mean):
         table[:, 2] = (table[:, 2] - table[:, 1]) / np.log1p(FASTER)
     if smooth:
         mean[:, :SPEED_UNITS] = around_rows(out[:, :SPEED_UNITS])

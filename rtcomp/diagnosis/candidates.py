@@ -194,7 +194,7 @@ def _phases(kind: type[Effect], entry: Entry, fitter: Fitter) -> list[float]:
 
 
 def _waves_of(kind: type[Effect], linear: str) -> bool:
-    return linear == "amplitude" and any(p.unit == ent.PHASE for p in kind.parameters)
+    return linear == ent.AMPLITUDE and any(p.unit == ent.PHASE for p in kind.parameters)
 
 
 def _candidate(

@@ -16,9 +16,9 @@ from rtcomp.recording.pieces import bridged
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.sensed import true_position
 
-MOST_ROWS = 32_000
+MOST_ROWS = 64_000
 """Rows of the recording that are used as they are; of longer ones windows are taken, evenly spread."""
-OVERSAMPLED = 5.0
+OVERSAMPLED = 4.0
 """Rate over the motion's bandwidth, from which on rows are averaged."""
 BEFORE = 10_000
 """Rows, at most, of the way to a window."""

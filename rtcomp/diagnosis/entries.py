@@ -22,7 +22,7 @@ Entry = dict[str, Any]
 
 ADDED = (wires.DRIVE, wires.PUSH, wires.FRICTION)
 """Wires to which forces are added."""
-PERIOD, PHASE, MOMENT = "period", "rad", "time"
+AMPLITUDE, PERIOD, PHASE, MOMENT = "amplitude", "period", "rad", "time"
 
 
 def kind_of(entry: Mapping[str, Any]) -> type[Effect]:
@@ -140,7 +140,7 @@ def _sized(entry: Mapping[str, Any]) -> list[tuple[str, tuple[float, ...]]]:
 
 def _of_wave(name: str) -> bool:
     """Tell whether a linear parameter is the size of what has the phase, where an effect has one."""
-    return name == "amplitude"
+    return name == AMPLITUDE
 
 
 def _phases(entry: Mapping[str, Any]) -> list[str]:

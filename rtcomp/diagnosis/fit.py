@@ -21,7 +21,7 @@ from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitted import Fitted, left_out
 from rtcomp.diagnosis.free import Free, Term, free_of
 from rtcomp.diagnosis.noise import Noise
-from rtcomp.diagnosis.other_forms import other_forms
+from rtcomp.diagnosis.other_forms import other_forms, overtones
 from rtcomp.diagnosis.regression import Grams, Prior
 from rtcomp.diagnosis.result import PositionFit
 from rtcomp.diagnosis.retuned import level_and_reach
@@ -117,12 +117,13 @@ class Fitter:
         c = np.delete(model.coefficients, np.arange(span.start, span.stop))
         return as_force(b, b.error(others, c, model.weights))
 
-    def other_forms(self, model: Fitted) -> Floats:
-        """Return the columns (q, n) of what other forms of a model's effects would do beside it."""
+    def other_forms(self, model: Fitted, *, waves: bool = False) -> Floats:
+        """Return the columns (q, n) of what other forms of a model's effects, or its waves, would do."""
         left = self.force(model)
-        forces = [self.without(model, i) - left for i in range(len(model.terms))]
-        pairs = zip(model.entries, forces, strict=True)
-        return np.concatenate([np.zeros((0, left.size)), *(other_forms(self.balance, *p) for p in pairs)])
+        forces = [self.without(model, i) - left for i in range(0 if waves else len(model.terms))]
+        found = [other_forms(self.balance, force) for force in forces]
+        found += [overtones(self, model, entry) for entry in model.entries]
+        return np.concatenate([np.zeros((0, left.size)), *found])
 
     def relative(self, model: Fitted) -> float:
         """Return what a model leaves over what there is to explain, rms of both, without the reserved."""

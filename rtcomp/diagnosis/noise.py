@@ -16,6 +16,9 @@ TOP = 0.1
 
 LEAD = 2
 """Rows at the ends of a segment that second differences do not do justice to."""
+ENDS, DRAWN_OUT = 0.1, 1e-3
+"""Part of a segment, at most, that is left out at each end; part of the power of a filter's answer that may
+reach further than that."""
 RINGING = 100
 """Rows at the ends of a band-limited segment that derivatives do not do justice to."""
 
@@ -57,6 +60,14 @@ class Noise:
         return float(np.hypot(stage.sensor.noise, stage.sensor.resolution / np.sqrt(12.0)))
 
 
+def _memory(response: Response, rate: float, rows: int) -> int:
+    """Return within how many rows a filter has all but a part of the power of its answer to a single row."""
+    frequency: Floats = np.asarray(np.fft.rfftfreq(2 * rows, 1.0 / rate), dtype=np.float64)
+    power = np.fft.irfft(response(frequency), 2 * rows)[:rows] ** 2
+    later = np.cumsum(power[::-1])[::-1]
+    return int(np.argmax(later < DRAWN_OUT * later[0]))
+
+
 @dataclass(frozen=True)
 class Whitening:
     """Weight of each frequency of the residual, and every how manieth row is enough of what is left."""
@@ -90,7 +101,9 @@ class Whitening:
         high = float(frequency[above[-1]]) if above.size else float(frequency[-1])
         thinning = max(1, int(data.rate / (2.5 * high)))
         lead = LEAD if data.held else RINGING
-        return cls(response, white, coloured, thinning, lead, lead + max(1, int(2.0 * data.rate / high)))
+        sizes = [s.time.size for s in data.segments]
+        reach = min(_memory(response, data.rate, max(sizes)), int(ENDS * min(sizes)))
+        return cls(response, white, coloured, thinning, lead, lead + max(1, reach))
 
     def filtered(self, segment: Segment) -> slice:
         """Return the rows that are filtered: what run-in or ends have wrong would be drawn out."""

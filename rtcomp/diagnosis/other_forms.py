@@ -8,6 +8,7 @@ the same over a period. What only does the same is no further effect.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,43 +17,86 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitted import Fitted, left_out
-from rtcomp.diagnosis.regression import Grams
+from rtcomp.diagnosis.regression import Grams, Prior
 from rtcomp.diagnosis.where import as_white
 from rtcomp.kernels import Floats
+from rtcomp.physics import Effect
 
 if TYPE_CHECKING:
     from rtcomp.diagnosis.fit import Fitter
 
-WAVES = 2
-"""Waves in a period by which one is bent."""
+OVERTONES = (2, 3)
+"""Times as fast as a wave, by which it is another form of it."""
+LONGER = 0.02
+"""Change of a period, in waves over the stroke, to which it is looked at: found without overtones, it is a
+little off."""
 
 
-def other_forms(balance: ForceBalance, entry: Entry, force: Floats) -> Floats:
+def other_forms(balance: ForceBalance, force: Floats) -> Floats:
     """Return the whitened columns (q, n) of an entry's `force` (N, (n,)), bent by functions of size 1."""
     most = float(np.abs(force).max(initial=0.0))
     if not np.isfinite(most) or most == 0.0:
         return np.zeros((0, force.size))
-    return np.array([as_white(balance, force * bend) for bend in _bends(balance, entry, force / most)])
+    return np.array([as_white(balance, force * bend) for bend in _bends(balance, force / most)])
+
+
+def overtones(fitter: Fitter, model: Fitted, entry: Entry) -> Floats:
+    """Return the columns (q, n) of what makes a wave of one form one of another; none of what is no wave."""
+    kind = ent.kind_of(entry)
+    phase = next((p.name for p in kind.parameters if p.unit == ent.PHASE), None)
+    if phase is None or not {ent.PERIOD, ent.AMPLITUDE} <= entry.keys():
+        return np.zeros((0, model.residual.size))
+    low, high = fitter.balance.data.stroke
+    still = {n: ent.neutral(kind, n) for n in kind.linear if n in entry and n != ent.AMPLITUDE}
+    found = []
+    for times in OVERTONES:
+        period = float(entry[ent.PERIOD]) / times
+        made = []
+        for longer in (0.0, LONGER * period / (high - low)):
+            wave = {**entry, **still, ent.PERIOD: period * (1.0 + longer)}
+            wave.pop("form", None)
+            made.append(_quarters(fitter, model, kind, wave, phase))
+        found += [made[0], (made[1] - made[0]) / LONGER]
+    return np.concatenate(found)
+
+
+def _quarters(fitter: Fitter, model: Fitted, kind: type[Effect], wave: Entry, phase: str) -> Floats:
+    """Return what a wave does beside a model, and what it does a quarter of a period later, (2, n)."""
+    if fitter.linear(kind):
+        return float(wave[ent.AMPLITUDE]) * fitter.units([*model.entries, wave])
+    return np.array([fitter.change(model, {**wave, phase: at}) for at in (0.0, 0.5 * np.pi)])
 
 
 def errors_beside(fitter: Fitter, model: Fitted, forms: Floats) -> Floats:
-    """Return the squared errors (B_use,) of blocks left out, with other forms (q, n) beside a model.
-
-    A form is believed to differ by about the effect's own size.
-    """
+    """Return the squared errors (B_use,) of blocks left out, with other forms (q, n) beside a model."""
     if not forms.size:
         return model.errors
-    system = model.system
-    columns = np.concatenate([system.columns, model.tangents, forms])
-    joint = Grams.of(columns, system.y, fitter.block, fitter.blocks)
-    some = np.full(columns.shape[0] - model.prior.low.size, np.inf)
-    prior = model.prior.extended(-some, some)
-    prior.precision[-forms.shape[0] :] = 1.0
-    whole = joint.solve(fitter.use, prior, model.variance)
+    _, joint, prior, whole = _beside(fitter, model, forms)
     return left_out(joint, fitter.use, prior, model.variance, whole)[0]
 
 
-def _bends(balance: ForceBalance, entry: Entry, force: Floats) -> Iterator[Floats]:
+def in_any_form(fitter: Fitter, model: Fitted, forms: Floats) -> Fitted:
+    """Return what a model would leave with other forms (q, n) beside it."""
+    if not forms.size:
+        return model
+    columns, _, _, whole = _beside(fitter, model, forms)
+    return replace(model, residual=model.system.y - whole @ columns)
+
+
+def _beside(fitter: Fitter, model: Fitted, forms: Floats) -> tuple[Floats, Grams, Prior, Floats]:
+    """Return all columns with other forms beside a model, their statistics, prior and coefficients.
+
+    A form is believed to differ by about the effect's own size.
+    """
+    columns = np.concatenate([model.system.columns, model.tangents, forms])
+    joint = Grams.of(columns, model.system.y, fitter.block, fitter.blocks)
+    some = np.full(columns.shape[0] - model.prior.low.size, np.inf)
+    prior = model.prior.extended(-some, some)
+    prior.precision[-forms.shape[0] :] = 1.0
+    return columns, joint, prior, joint.solve(fitter.use, prior, model.variance)
+
+
+def _bends(balance: ForceBalance, force: Floats) -> Iterator[Floats]:
     """Go through smooth functions (n,) between -1 and 1 of what a force may depend on."""
     paths = balance.paths()
     position = balance.plain([p.x for p in paths])
@@ -62,8 +106,3 @@ def _bends(balance: ForceBalance, entry: Entry, force: Floats) -> Iterator[Float
         at = (2.0 * signal - low - high) / max(high - low, 1e-300)
         yield at
         yield 1.5 * at**2 - 0.5
-    if ent.PERIOD in entry and any(p.unit == ent.PHASE for p in ent.kind_of(entry).parameters):
-        for k in range(1, WAVES + 1):
-            angle = 2.0 * np.pi * k / float(entry[ent.PERIOD]) * position
-            yield np.sin(angle)
-            yield np.cos(angle)

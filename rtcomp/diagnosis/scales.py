@@ -102,7 +102,7 @@ class Scales:
             "V": self.volts,
             "N": self.force * np.array([0.3, 1.0, 3.0]),
             "s": np.geomspace(*self.time, POINTS + 2)[1:],
-            "Hz": np.geomspace(*self.frequency, 2 * POINTS),
+            "Hz": np.geomspace(*self.frequency, 8 * POINTS),
         }.get(unit)
         return None if found is None else _listed(found)
 

@@ -6,12 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.balance import LEAST_FORCE, ForceBalance
 from rtcomp.errors import RecordingError
 from rtcomp.stage.stage import Stage
-
-LEAST_FORCE = 0.01
-"""Part of the other blocks' force (rms) that the reserved ones must have to judge by it."""
 
 
 class Reserved:
