@@ -10,7 +10,6 @@ import numpy as np
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.candidates import searchable
 from rtcomp.diagnosis.confidence import Alternatives
 from rtcomp.diagnosis.curves import left_over
 from rtcomp.diagnosis.detectability import sights
@@ -101,8 +100,7 @@ def answer(
         moved if matters else [],
         named,
         fit,
-        [s.name for s in seen if not s.seen and s.name not in names]
-        + [k.name for k in searchable(balance) if not fitter.judges(k)],
+        [s.name for s in seen if not s.seen and s.name not in names],
         stages["after"],
         _experiment(fitter, chosen, sets, named, view),
         seen,

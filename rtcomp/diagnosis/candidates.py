@@ -96,10 +96,7 @@ def candidates(
     kinds = [
         k
         for k in searchable(balance)
-        if k.name not in taken
-        and fitter.judges(k)
-        and not (offset and _only_bias(k, balance))
-        and ent.happens_once(k) >= events
+        if k.name not in taken and not (offset and _only_bias(k, balance)) and ent.happens_once(k) >= events
     ]
     points = {k: list(_points(k, scales, fitter)) for k in kinds}
 

@@ -18,8 +18,8 @@ from rtcomp.stage.sensed import true_position
 
 MOST_ROWS = 64_000
 """Rows of the recording that are used as they are; of longer ones windows are taken, evenly spread."""
-OVERSAMPLED = 4.0
-"""Rate over the motion's bandwidth, from which on rows are averaged."""
+ENOUGH, OVERSAMPLED = 16_000, 4.0
+"""Rows beyond which they are averaged, to a rate over the motion's bandwidth of no less than that."""
 BEFORE = 10_000
 """Rows, at most, of the way to a window."""
 RUN_IN = 0.2
@@ -96,11 +96,12 @@ class Data:
 def load_data(recordings: Sequence[Recording], *, held: bool = True, bandwidth: float = 0.0) -> Data:
     """Return the recordings (of one rate) as segments: without long gaps, windows of very long ones.
 
-    Where the `bandwidth` (Hz) of the motion is known, rows far beyond it are averaged.
+    Where the `bandwidth` (Hz) of the motion is known, many rows far beyond it are averaged.
     """
     rate = recordings[0].rate_hz
     found = [s for r in recordings for s in _segments(r)]
-    factor = max(1, int(rate / (OVERSAMPLED * bandwidth))) if bandwidth else 1
+    many = -(-sum(s.time.size for s in found) // ENOUGH)
+    factor = max(1, min(many, int(rate / (OVERSAMPLED * bandwidth)))) if bandwidth else 1
     if factor > 1:
         found, rate = [averaged(s, factor) for s in found], rate / factor
     rows = sum(s.time.size for s in found)

@@ -81,10 +81,6 @@ class Fitter:
         """Tell whether the sizes of an effect are coefficients, so that any start value of them will do."""
         return ent.adds_force(kind)
 
-    def judges(self, kind: type[Effect]) -> bool:
-        """Tell whether the objective can tell an effect at all."""
-        return True
-
     def rough(self, model: Fitted, families: Sequence[Sequence[Term]], count: int, ends: float) -> list[Term]:
         """Return terms of `count` families that are worth a full fit beside a model.
 

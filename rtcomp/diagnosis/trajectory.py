@@ -27,7 +27,7 @@ from rtcomp.diagnosis.result import PositionFit
 from rtcomp.diagnosis.windows import GROUPS, Windows
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
-from rtcomp.physics import Effect, Place
+from rtcomp.physics import Effect
 from rtcomp.stage.stage import Stage
 
 STEP = 5e-3
@@ -87,10 +87,6 @@ class Trajectory(Fitter):
     def linear(self, kind: type[Effect]) -> bool:
         """See `Fitter`: nothing is linear here."""
         return False
-
-    def judges(self, kind: type[Effect]) -> bool:
-        """See `Fitter`: what a sensor does is no motion, and in so short a window no more than one."""
-        return kind.place is not Place.SENSOR
 
     def rough(self, model: Fitted, families: Sequence[Sequence[Term]], count: int, ends: float) -> list[Term]:
         """See `Fitter`: first order is no guide to what sticks."""
