@@ -99,8 +99,6 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
     """
     said = []
     louder = fitter.louder(chosen)
-    # A wave of any form is the same effect: what only makes its form another is not left.
-    beside = in_any_form(fitter, chosen, fitter.other_forms(chosen, waves=True))
     more = null is not None and null.p_of_error(float(chosen.errors.sum())) < LEVEL
     for i, span in enumerate(told(fitter, chosen)):
         why = "its size may be nothing" if span.nothing else ""
@@ -108,7 +106,9 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
         left = 1.0
         if not why:
             without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
-            left, there = (fitter.above_noise(model, louder) ** 2 for model in (beside, without))
+            # A wave of any form is the same effect: what only makes its form another is not left.
+            rest = in_any_form(fitter, chosen, fitter.overtones(chosen, i))
+            left, there = (fitter.above_noise(model, louder) ** 2 for model in (rest, without))
             left /= max(there, 1e-300)
             why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""
         said.append(Doubt(why, left))

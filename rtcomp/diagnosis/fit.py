@@ -15,6 +15,7 @@ import numpy as np
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import BASE, ForceBalance, System
 from rtcomp.diagnosis.believed import prior_of
+from rtcomp.diagnosis.cache import KEPT_ONCE, Cache
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.data import Data
 from rtcomp.diagnosis.entries import Entry
@@ -51,6 +52,7 @@ class Fitter:
         self.offset = False
         """Whether a constant force that nobody believes is fitted beside every model."""
         self._believed = [Term.of(e) for e in balance.believed]
+        self._forms = Cache(KEPT_ONCE)
 
     @property
     def use(self) -> np.ndarray:
@@ -113,13 +115,21 @@ class Fitter:
         c = np.delete(model.coefficients, np.arange(span.start, span.stop))
         return as_force(b, b.error(others, c, model.weights))
 
-    def other_forms(self, model: Fitted, *, waves: bool = False) -> Floats:
-        """Return the columns (q, n) of what other forms of a model's effects, or its waves, would do."""
-        left = self.force(model)
-        forces = [self.without(model, i) - left for i in range(0 if waves else len(model.terms))]
-        found = [other_forms(self.balance, force) for force in forces]
-        found += [overtones(self, model, entry) for entry in model.entries]
-        return np.concatenate([np.zeros((0, left.size)), *found])
+    def other_forms(self, model: Fitted) -> Floats:
+        """Return the columns (q, n) of what other forms of a model's effects would do beside it."""
+
+        def made() -> list[Floats]:
+            left, count = self.force(model), len(model.terms)
+            found = [other_forms(self.balance, self.without(model, i) - left) for i in range(count)]
+            found += [self.overtones(model, i) for i in range(count)]
+            return [np.concatenate([np.zeros((0, left.size)), *found])]
+
+        found: Floats = self._forms.of(model, made)[0]
+        return found
+
+    def overtones(self, model: Fitted, at: int) -> Floats:
+        """Return the columns (q, n) of what another form of its effect number `at`, if a wave, would do."""
+        return overtones(self, model, model.entries[at])
 
     def relative(self, model: Fitted) -> float:
         """Return what a model leaves over what there is to explain, rms of both, without the reserved."""

@@ -16,7 +16,7 @@ ONCE = 0.5
 """A column with more than this part of its power in one block: the other blocks do not show its size."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fitted:
     """A model fitted on the blocks that are not reserved."""
 

@@ -41,21 +41,25 @@ def other_forms(balance: ForceBalance, force: Floats) -> Floats:
 
 
 def overtones(fitter: Fitter, model: Fitted, entry: Entry) -> Floats:
-    """Return the columns (q, n) of what makes a wave of one form one of another; none of what is no wave."""
+    """Return the columns (q, n) of what makes a wave of one form one of another.
+
+    None of what is no wave, or does not repeat within the stroke: that is any function of the position.
+    """
     kind = ent.kind_of(entry)
     phase = next((p.name for p in kind.parameters if p.unit == ent.PHASE), None)
-    if phase is None or not {ent.PERIOD, ent.AMPLITUDE} <= entry.keys():
-        return np.zeros((0, model.residual.size))
     low, high = fitter.balance.data.stroke
+    wave = phase is not None and {ent.PERIOD, ent.AMPLITUDE} <= entry.keys()
+    if phase is None or not wave or 2.0 * float(entry[ent.PERIOD]) > high - low:
+        return np.zeros((0, model.residual.size))
     still = {n: ent.neutral(kind, n) for n in kind.linear if n in entry and n != ent.AMPLITUDE}
     found = []
     for times in OVERTONES:
         period = float(entry[ent.PERIOD]) / times
         made = []
         for longer in (0.0, LONGER * period / (high - low)):
-            wave = {**entry, **still, ent.PERIOD: period * (1.0 + longer)}
-            wave.pop("form", None)
-            made.append(_quarters(fitter, model, kind, wave, phase))
+            other = {**entry, **still, ent.PERIOD: period * (1.0 + longer)}
+            other.pop("form", None)
+            made.append(_quarters(fitter, model, kind, other, phase))
         found += [made[0], (made[1] - made[0]) / LONGER]
     return np.concatenate(found)
 

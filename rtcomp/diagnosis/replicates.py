@@ -70,30 +70,50 @@ def null_of(fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: i
         found += [f for f in shared(one, range(first, last)) if f is not None]
         if len(found) < FEW // 2:
             return _surrogates(fitter, fitted, screen, seed)
-        null = Null(*np.array(found).T)
+        gains, errors = np.array(found).T
+        null = Null(_of_all(fitted, gains, errors, _turned(fitted, screen, seed, gains.size)), errors)
         if null.plain(gain, float(fitted.errors.sum())):
             break
     return null
 
 
-def _surrogates(fitter: Fitter, fitted: Fitted, screen: Screen, seed: int) -> Null:
-    """Return the null distribution of residuals of the same spectrum that know nothing of the motion.
+def _of_all(fitted: Fitted, gains: Floats, errors: Floats, by_chance: Floats) -> Floats:
+    """Return the largest gains (R,) of all that a model leaves, where no candidate is in it.
 
-    Phases are drawn anew (Theiler and others 1992, Physica D 58). The error that noise alone leaves is that
-    of the whitened residual: 1 a row.
+    Replicates have `gains` of their `errors`, noise and what the method itself has wrong. What is left beyond
+    that is of unknown cause: of it a candidate takes away what it does `by_chance`.
+    """
+    whole = float(fitted.errors.sum())
+    known = np.minimum(errors, whole)
+    left = known * np.exp(-gains) + (whole - known) * np.exp(-by_chance)
+    return np.asarray(-np.log(left / whole))
+
+
+def _turned(fitted: Fitted, screen: Screen, seed: int, count: int) -> Floats:
+    """Return the largest gains (R,) on residuals of the same spectrum that know nothing of the motion.
+
+    Their phases are drawn anew (Theiler and others 1992, Physica D 58).
     """
     random = np.random.default_rng(seed)
     columns = free_columns(fitted)
     size = np.abs(np.fft.rfft(fitted.residual))
+    phases = random.random((count, size.size))
 
-    def one(_: int) -> float:
-        turned = size * np.exp(2j * np.pi * random.random(size.size))
-        gains = screen.gains(columns, np.fft.irfft(turned, fitted.residual.size))
-        return max((s.gain for s in gains), default=0.0)
+    def one(phase: Floats) -> float:
+        other = np.fft.irfft(size * np.exp(2j * np.pi * phase), fitted.residual.size)
+        return max((s.gain for s in screen.gains(columns, other)), default=0.0)
 
+    return np.array(shared(one, phases))
+
+
+def _surrogates(fitter: Fitter, fitted: Fitted, screen: Screen, seed: int) -> Null:
+    """Return the null distribution of residuals that know nothing of the motion.
+
+    The error that noise alone leaves is that of the whitened residual: 1 a row.
+    """
     rows = float(np.count_nonzero(fitter.rows))
-    chance = random.normal(1.0, np.sqrt(2.0 / rows), FEW)
-    return Null(np.array([one(k) for k in range(FEW)]), rows * chance)
+    chance = np.random.default_rng(seed).normal(1.0, np.sqrt(2.0 / rows), FEW)
+    return Null(_turned(fitted, screen, seed, FEW), rows * chance)
 
 
 def best(names: Sequence[str], gains: Sequence[float], count: int) -> list[int]:

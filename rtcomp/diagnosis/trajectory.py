@@ -113,8 +113,12 @@ class Trajectory(Fitter):
         drive, needed = self.balance.both_sides(stage)
         return np.asarray(drive - needed)
 
-    def other_forms(self, model: Fitted, *, waves: bool = False) -> Floats:
+    def other_forms(self, model: Fitted) -> Floats:
         """Return no columns: what a force does to the position is not in proportion to it."""
+        return np.zeros((0, model.residual.size))
+
+    def overtones(self, model: Fitted, at: int) -> Floats:
+        """See `other_forms`."""
         return np.zeros((0, model.residual.size))
 
     def relative(self, model: Fitted) -> float:
