@@ -89,6 +89,8 @@ class Belief:
                 mine, at = ent.composed(mine, sizes[at : at + count]), at + count
             effects.append(mine)
         effects = merged([*effects, *entries])
+        for entry in effects:
+            ent.build(entry)  # out of range, it says so as all others do
         m["effects"] = effects
         if not effects:
             del m["effects"]
