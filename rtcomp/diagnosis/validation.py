@@ -21,9 +21,10 @@ class Reserved:
         self._balance, self._judged = balance, False
         force, rows = balance.drive_force(), balance.reserved[balance.block]
         here, elsewhere = float(np.std(force[rows])), float(np.std(force[~rows]))
-        if here < LEAST_FORCE * elsewhere:
+        if min(here, elsewhere) < LEAST_FORCE * max(here, elsewhere):
+            where = "in" if here < elsewhere else "but in"
             raise RecordingError(
-                f"nothing moves in the part kept for the judgement: its force varies by {here:.3g} N, "
+                f"nothing moves {where} the part kept for the judgement: its force varies by {here:.3g} N, "
                 f"that of the rest by {elsewhere:.3g} N; record motion throughout, or cut the rests"
             )
 
