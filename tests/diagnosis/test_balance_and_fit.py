@@ -185,7 +185,7 @@ def test_a_judgement_needs_motion_in_the_reserved_blocks() -> None:
 
     # At rest in the third block of five another is kept; at rest in all but those that go furthest, none.
     Reserved(balance(np.any([np.abs(t - middle) < 1.6 for middle in (5.0, 15.0)], axis=0)))
-    with pytest.raises(RecordingError, match="nothing moves .*in the part kept for the judgement"):
+    with pytest.raises(RecordingError, match=r"nothing moves .*in the part kept for the judgement"):
         Reserved(balance(np.abs(t - 10.0) < 8.3))
 
 
