@@ -16,7 +16,7 @@ from rtcomp.recording.pieces import bridged
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.sensed import true_position
 
-MOST_ROWS = 64_000
+MOST_ROWS = 36_000
 """Rows of the recording that are used as they are; of longer ones windows are taken, evenly spread."""
 ENOUGH, OVERSAMPLED = 16_000, 4.0
 """Rows beyond which they are averaged, to a rate over the motion's bandwidth of no less than that."""
