@@ -17,8 +17,8 @@ TOP = 0.1
 LEAD = 2
 """Rows at the ends of a segment that second differences do not do justice to."""
 ENDS, DRAWN_OUT = 0.1, 1e-3
-"""Part of a segment, at most, that is left out at each end; part of the power of a filter's answer that may
-reach further than that."""
+"""Maximum part of a segment that is not compared at each end; maximum part of the power of the filter's
+impulse response beyond these rows."""
 RINGING = 100
 """Rows at the ends of a band-limited segment that derivatives do not do justice to."""
 

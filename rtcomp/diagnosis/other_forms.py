@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from rtcomp.diagnosis.fit import Fitter
 
 OVERTONES = (2, 3)
-"""Times as fast as a wave, by which it is another form of it."""
+"""Orders of the overtones that another form of a wave may have."""
 LONGER = 0.02
-"""Change of a period, in waves over the stroke, to which it is looked at: found without overtones, it is a
-little off."""
+"""Step of the derivative by the period, in waves over the stroke: a period that was fitted without overtones
+is biased."""
 
 
 def other_forms(balance: ForceBalance, force: Floats) -> Floats:

@@ -71,17 +71,17 @@ def null_of(fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: i
         if len(found) < FEW // 2:
             return _surrogates(fitter, fitted, screen, seed)
         gains, errors = np.array(found).T
-        null = Null(_of_all(fitted, gains, errors, _turned(fitted, screen, seed, gains.size)), errors)
+        null = Null(_mixed(fitted, gains, errors, _by_chance(fitted, screen, seed, gains.size)), errors)
         if null.plain(gain, float(fitted.errors.sum())):
             break
     return null
 
 
-def _of_all(fitted: Fitted, gains: Floats, errors: Floats, by_chance: Floats) -> Floats:
-    """Return the largest gains (R,) of all that a model leaves, where no candidate is in it.
+def _mixed(fitted: Fitted, gains: Floats, errors: Floats, by_chance: Floats) -> Floats:
+    """Return the largest gains (R,) on the residual of a model if no candidate is part of the truth.
 
-    Replicates have `gains` of their `errors`, noise and what the method itself has wrong. What is left beyond
-    that is of unknown cause: of it a candidate takes away what it does `by_chance`.
+    The residual has two parts. One is as large as the `errors` of the replicates: noise, and the errors of
+    the method; its gains are theirs. The cause of the rest is unknown; its gains are those `by_chance`.
     """
     whole = float(fitted.errors.sum())
     known = np.minimum(errors, whole)
@@ -89,10 +89,11 @@ def _of_all(fitted: Fitted, gains: Floats, errors: Floats, by_chance: Floats) ->
     return np.asarray(-np.log(left / whole))
 
 
-def _turned(fitted: Fitted, screen: Screen, seed: int, count: int) -> Floats:
-    """Return the largest gains (R,) on residuals of the same spectrum that know nothing of the motion.
+def _by_chance(fitted: Fitted, screen: Screen, seed: int, count: int) -> Floats:
+    """Return the largest gains (R,) on phase-randomised surrogates of the residual.
 
-    Their phases are drawn anew (Theiler and others 1992, Physica D 58).
+    A surrogate has the spectrum of the residual and random phases, so it is independent of the motion
+    (Theiler and others 1992, Physica D 58).
     """
     random = np.random.default_rng(seed)
     columns = free_columns(fitted)
@@ -107,13 +108,13 @@ def _turned(fitted: Fitted, screen: Screen, seed: int, count: int) -> Floats:
 
 
 def _surrogates(fitter: Fitter, fitted: Fitted, screen: Screen, seed: int) -> Null:
-    """Return the null distribution of residuals that know nothing of the motion.
+    """Return the null distribution of phase-randomised surrogates of the residual.
 
-    The error that noise alone leaves is that of the whitened residual: 1 a row.
+    The squared error of noise alone is that of the whitened residual: 1 in each row.
     """
     rows = float(np.count_nonzero(fitter.rows))
     chance = np.random.default_rng(seed).normal(1.0, np.sqrt(2.0 / rows), FEW)
-    return Null(_turned(fitted, screen, seed, FEW), rows * chance)
+    return Null(_by_chance(fitted, screen, seed, FEW), rows * chance)
 
 
 def best(names: Sequence[str], gains: Sequence[float], count: int) -> list[int]:
