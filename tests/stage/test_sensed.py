@@ -57,3 +57,10 @@ def test_smoothed_counts_have_the_jump_as_smooth_as_they_are() -> None:
     ]
     assert true_position([effect], mean[0], mean[1], 2, 120.0) == pytest.approx(mean[2], abs=1e-12)
     assert np.abs(true_position([effect], mean[0], mean[1], 2) - mean[2]).max() > 5e-6
+
+
+@pytest.mark.parametrize("delay", [0.5e-3, 3.57e-3])
+def test_a_late_reading_keeps_its_noise(delay):
+    noise = np.random.default_rng(0).standard_normal(4000)
+    found = true_position([build({"name": "sensor-delay", "delay": delay})], np.arange(4000) / 1000.0, noise)
+    assert np.std(found[20:-20]) == pytest.approx(np.std(noise), rel=0.01)
