@@ -99,7 +99,7 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
     """
     said = []
     louder = fitter.louder(chosen)
-    more = null is not None and null.p_of_error(float(chosen.errors.sum())) < LEVEL
+    more = null is not None and null.p_of_error(chosen.errors) < LEVEL
     for i, span in enumerate(told(fitter, chosen)):
         why = "its size may be nothing" if span.nothing else ""
         why = f"{', '.join(span.bound)} at its bound" if span.bound else why

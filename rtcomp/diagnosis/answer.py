@@ -48,11 +48,11 @@ class Rest:
         relative = fitter.above_noise(found.chosen)
         if found.null is None:
             return cls(relative > TOLERANCE, 1.0 if not found.chosen.terms else error / first)
-        noise = float(np.median(found.null.errors))
+        noise = found.null.noise
         share = max(error - noise, 0.0) / max(first - noise, 1e-300)
         # Of many small things none of which could be named, the square counts: they do not add up to one.
         matters = relative > TOLERANCE and (not found.chosen.terms or share > LEAST_GAIN)
-        significant = matters and found.null.p_of_error(error) < LEVEL
+        significant = matters and found.null.p_of_error(found.chosen.errors) < LEVEL
         return cls(significant, min(share, 1.0))
 
 

@@ -49,7 +49,7 @@ def null_of(fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: i
     names = ent.names(fitted.entries)
     events = any(ent.happens_once(ent.kind_of(c.term.entry)) for c in screen.candidates)
 
-    def one(number: int) -> tuple[float, float] | None:
+    def one(number: int) -> tuple[float, Floats] | None:
         data = replicate(stage, balance.data, motion, noise, 1000 * seed + number)
         if data is None:
             return None
@@ -63,16 +63,17 @@ def null_of(fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: i
                 free_columns(again), again.residual
             )
         scale = fitter.power / max(other.power, 1e-300)
-        return max((s.gain for s in gains), default=0.0), float(again.errors.sum()) * scale
+        return max((s.gain for s in gains), default=0.0), again.errors * scale
 
-    found: list[tuple[float, float]] = []
+    found: list[tuple[float, Floats]] = []
     for first, last in ((0, FEW), (FEW, REPLICATES)):
         found += [f for f in shared(one, range(first, last)) if f is not None]
         if len(found) < FEW // 2:
             return _surrogates(fitter, fitted, screen, seed)
-        gains, errors = np.array(found).T
-        null = Null(_mixed(fitted, gains, errors, _by_chance(fitted, screen, seed, gains.size)), errors)
-        if null.plain(gain, float(fitted.errors.sum())):
+        gains, errors = (np.array(each) for each in zip(*found, strict=True))
+        by_chance = _by_chance(fitted, screen, seed, gains.size)
+        null = Null(_mixed(fitted, gains, errors.sum(axis=1), by_chance), errors)
+        if null.plain(gain, fitted.errors):
             break
     return null
 
@@ -112,9 +113,9 @@ def _surrogates(fitter: Fitter, fitted: Fitted, screen: Screen, seed: int) -> Nu
 
     The squared error of noise alone is that of the whitened residual: 1 in each row.
     """
-    rows = float(np.count_nonzero(fitter.rows))
-    chance = np.random.default_rng(seed).normal(1.0, np.sqrt(2.0 / rows), FEW)
-    return Null(_by_chance(fitted, screen, seed, FEW), rows * chance)
+    rows = np.bincount(fitter.block, minlength=fitter.blocks)[fitter.use]
+    noise = np.random.default_rng(seed).chisquare(np.maximum(rows, 1), (FEW, rows.size))
+    return Null(_by_chance(fitted, screen, seed, FEW), noise)
 
 
 def best(names: Sequence[str], gains: Sequence[float], count: int) -> list[int]:

@@ -92,7 +92,7 @@ def search(
         _skipped(found, judged.cut)
         if step == 0:
             found.screened = _table(judged.candidates, judged.screened, null)
-        done = null.settled(judged.gain, float(beam[0].errors.sum()), LEVEL)
+        done = null.settled(judged.gain, beam[0].errors, LEVEL)
         if done or step == MOST_EFFECTS or exhausted(fitter, beam[0], everything):
             break
         if time.monotonic() > ends:
@@ -268,7 +268,7 @@ def _sound(seen: Look, parent: float) -> Look | None:
     A model that explains recordings of its own no better than the one before explains the real recording has
     shown nothing: it put the drive's force on both sides of the balance.
     """
-    if seen.null is not None and float(np.median(seen.null.errors)) > parent:
+    if seen.null is not None and seen.null.noise > parent:
         return None
     return seen
 

@@ -15,10 +15,15 @@ PLAIN = (1e-8, 0.3)
 
 @dataclass(frozen=True)
 class Null:
-    """Largest gains, one a replicate, and squared errors that replicates leave, (R,) each."""
+    """Largest gains, one a replicate, (R,), and squared errors that replicates leave in blocks, (R, B)."""
 
     gains: Floats
     errors: Floats
+
+    @property
+    def noise(self) -> float:
+        """Squared error that noise, and the method's own errors, usually leave in all blocks."""
+        return float(np.median(self.errors.sum(axis=1)))
 
     def p_value(self, gain: float) -> float:
         """Return the probability of a gain as large where nothing is missing.
@@ -32,17 +37,25 @@ class Null:
         spread = float(self.gains.std(ddof=1)) * np.sqrt(6.0) / np.pi
         return float(self.gains.mean() - 0.5772156649 * spread - spread * np.log(-np.log1p(-level)))
 
-    def p_of_error(self, error: float) -> float:
-        """Return the probability of a squared error as large where the model is the whole truth."""
-        return _gumbel_tail(np.log(self.errors), float(np.log(max(error, 1e-300))))
+    def p_of_error(self, errors: Floats) -> float:
+        """Return the probability of squared errors (B,) as large where the model is the whole truth.
 
-    def settled(self, gain: float, error: float, level: float) -> bool:
-        """Tell whether neither the largest gain nor the error left is more than chance at `level`."""
-        return self.p_value(gain) > level and self.p_of_error(error) > level
+        What counts is the mean of their logarithms over blocks, as for a gain: a single block in which an
+        unstable axis went another way says little of the others.
+        """
+        return _gumbel_tail(_level(self.errors), float(_level(errors)))
 
-    def plain(self, gain: float, error: float) -> bool:
-        """Tell whether more replicates would change no decision on this gain and this error."""
-        return all(p < PLAIN[0] or p > PLAIN[1] for p in (self.p_value(gain), self.p_of_error(error)))
+    def settled(self, gain: float, errors: Floats, level: float) -> bool:
+        """Tell whether neither the largest gain nor the errors left are more than chance at `level`."""
+        return self.p_value(gain) > level and self.p_of_error(errors) > level
+
+    def plain(self, gain: float, errors: Floats) -> bool:
+        """Tell whether more replicates would change no decision on this gain and these errors."""
+        return all(p < PLAIN[0] or p > PLAIN[1] for p in (self.p_value(gain), self.p_of_error(errors)))
+
+
+def _level(errors: Floats) -> Floats:
+    return np.asarray(np.log(np.maximum(errors, 1e-300)).mean(axis=-1))
 
 
 def _gumbel_tail(sample: Floats, value: float) -> float:

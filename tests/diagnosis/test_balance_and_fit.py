@@ -141,11 +141,20 @@ def test_gains_are_those_of_refits_without_each_block() -> None:
 
 def test_a_gain_like_those_of_replicates_is_chance_and_a_larger_one_is_not() -> None:
     random = np.random.default_rng(2)
-    null = Null(random.gumbel(0.02, 0.003, 19), random.normal(1000.0, 10.0, 19))
+    null = Null(random.gumbel(0.02, 0.003, 19), random.normal(100.0, 3.0, (19, 10)))
     assert null.p_value(0.02) > 0.2
     assert null.p_value(0.06) < 0.001
     assert null.p_value(null.threshold(0.01)) == pytest.approx(0.01, rel=1e-3)
-    assert null.p_of_error(1000.0) > 0.2 and null.p_of_error(1200.0) < 0.01
+    assert null.p_of_error(np.full(10, 100.0)) > 0.2 and null.p_of_error(np.full(10, 120.0)) < 0.01
+
+
+def test_a_replicate_that_went_another_way_in_one_block_hides_no_error_in_all_others() -> None:
+    random = np.random.default_rng(5)
+    errors = random.normal(100.0, 3.0, (19, 10))
+    errors[np.arange(19), random.integers(0, 10, 19)] *= random.uniform(1.0, 100.0, 19)
+    null = Null(np.ones(19), errors)
+    assert null.p_of_error(np.full(10, 300.0)) < 0.01
+    assert null.p_of_error(errors[7]) > 0.01
 
 
 @given(st.integers(0, 1000))
@@ -310,7 +319,7 @@ def test_an_effect_is_doubted_where_much_is_left_beside_it(bump: float, doubted:
     balance = ForceBalance(stage(), load_data([run(truth, there_and_back(20.0))]))
     base, fitter = baseline(balance), Fitter(balance)
     chosen = fitter.fit([Term.of(wave)], base)
-    noise = Null(np.ones(19), chosen.errors.size * np.linspace(0.9, 1.1, 19))
+    noise = Null(np.ones(19), np.ones_like(chosen.errors) * np.linspace(0.9, 1.1, 19)[:, None])
     assert bool(doubts(fitter, chosen, noise)[0].why) == doubted
 
 
@@ -320,6 +329,6 @@ def test_a_wave_is_not_doubted_for_overtones_that_its_form_has_not() -> None:
     balance = ForceBalance(stage(), load_data([run(stage(effects=[wave, second]), there_and_back(20.0))]))
     base, fitter = baseline(balance), Fitter(balance)
     chosen = fitter.fit([Term.of(wave)], base)
-    noise = Null(np.ones(19), chosen.errors.size * np.linspace(0.9, 1.1, 19))
+    noise = Null(np.ones(19), np.ones_like(chosen.errors) * np.linspace(0.9, 1.1, 19)[:, None])
     assert doubts(fitter, chosen, noise)[0].left < 0.05
     assert fitter.above_noise(chosen) > 0.3 * fitter.above_noise(base)
