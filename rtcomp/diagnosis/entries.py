@@ -104,6 +104,11 @@ def parameter(kind: type[Effect], name: str) -> Parameter:
     return next(p for p in kind.parameters if p.name == name)
 
 
+def highest(entry: Mapping[str, Any], p: Parameter) -> float:
+    """Return the highest value of a parameter in the form that the entry states, without one in the first."""
+    return p.highest(str(entry.get("form", next(iter(kind_of(entry).forms), ""))))
+
+
 def neutral(kind: type[Effect], name: str) -> float:
     """Return the value of a parameter at which the effect changes nothing, 0 where none is stated."""
     return float((kind.neutral or {}).get(name, 0.0))
@@ -196,8 +201,9 @@ def bounds_of(entry: Mapping[str, Any]) -> tuple[Floats, Floats]:
     for name, quarters in _sized(entry):
         p = parameter(kind, name)
         shifted = bool(_phases(entry)) and _of_wave(name)
-        low += [-p.high if shifted else p.lowest] * max(len(quarters), 1)
-        high += [p.high] * max(len(quarters), 1)
+        most = highest(entry, p)
+        low += [-most if shifted else p.lowest] * max(len(quarters), 1)
+        high += [most] * max(len(quarters), 1)
     return np.array(low), np.array(high)
 
 

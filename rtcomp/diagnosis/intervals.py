@@ -64,7 +64,7 @@ def told(fitter: Fitter, fitted: Fitted) -> list[Told]:
                 sd = _deviation(apart)
                 size = 2.0 if p.unit == ent.PHASE else abs(value)
                 half = math.hypot(factor * max(sd, once.get(p.name, 0.0)), MODEL * size)
-                if _at_bound(value, p.lowest, p.high):
+                if _at_bound(value, p.lowest, ent.highest(term.entry, p)):
                     bound.append(p.name)
             elif p.name == ent.MOMENT:
                 half = balance.data.period

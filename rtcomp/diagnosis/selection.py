@@ -7,8 +7,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.acceptance import accepted, doubts, exhausted, pruned, score
 from rtcomp.diagnosis.baseline import settle

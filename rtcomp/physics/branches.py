@@ -96,6 +96,10 @@ class AsymmetricFriction(Effect):
         return [ClosingBranches(asymmetry=self.values["asymmetry"])]
 
 
+MONOTONE = {"force": 1.0}
+"""Largest softening by form with which the bend is monotone, where it must be."""
+
+
 @register
 class NonCongruentFriction(Effect):
     """Equal reversals at different force give loops of different shape.
@@ -103,14 +107,18 @@ class NonCongruentFriction(Effect):
     In the form `force` the friction model's force F is bent: steeper by 1 + softening at zero force, less
     steep by 1 - softening at its level, where it is unchanged. In the form `elements` so is the force of each
     element of a friction model by its deflection over its reach; a model without elements is one element. A
-    bent output keeps what a memory without drift needs: closed loops stay closed, wiping-out holds, and, the
-    bend being monotone, loops dissipate; only congruency is lost. It needs a friction model in the stage; of
-    damping nothing is bent.
+    bent output keeps what a memory without drift needs: closed loops stay closed, wiping-out holds, and loops
+    dissipate; only congruency is lost. For that the bend of the whole force must be monotone (softening at
+    most 1), or small loops close to the level would give energy. An element is a spring that slips at its
+    reach: bent in any way, it stores energy while it sticks and loses it while it slips. It needs a friction
+    model in the stage; of damping nothing is bent.
     """
 
     name = "non-congruent-friction"
     place = Place.FRICTION
-    parameters = (Parameter("softening", "1", -1.0, 1.0, "loss of slope from the middle to the level"),)
+    parameters = (
+        Parameter("softening", "1", -1.0, 10.0, "loss of slope from middle to level", high_in=MONOTONE),
+    )
     kernel = non_congruent_friction
     forms = {"force": non_congruent_friction, "elements": non_congruent_elements}
     says = "contacts are softer the more they carry: loops at high force are flatter than those around zero"

@@ -58,7 +58,7 @@ import enum
 import math
 import numbers
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -97,25 +97,31 @@ class Parameter:
 
     held: bool = False
     """True where a fit leaves it as it is: other parameters make up for any change of it."""
+    high_in: Mapping[str, float] = field(default_factory=dict)
+    """Highest value in a form of the effect, by its name, where that is not `high`."""
 
     @property
     def lowest(self) -> float:
         """Lowest physical value: `physical_low`, or `low` where none is stated."""
         return self.low if self.physical_low is None else self.physical_low
 
-    def check(self, value: Any, owner: str) -> float:
+    def highest(self, form: str) -> float:
+        """Return the highest value in a form of the effect, "" where it has one only."""
+        return self.high_in.get(form, self.high)
+
+    def check(self, value: Any, owner: str, form: str = "") -> float:
         """Return `value` as a float, or raise ConfigError naming the parameter, the value and the range."""
         if isinstance(value, bool) or not isinstance(value, numbers.Real):
             raise ConfigError(
                 f"{owner}: {self.name} is {value!r}; it must be a number ({self.unit})", key=(self.name,)
             )
-        number = float(value)
-        inside = self.low < number <= self.high if self.open_low else self.low <= number <= self.high
+        number, high = float(value), self.highest(form)
+        inside = self.low < number <= high if self.open_low else self.low <= number <= high
         if not np.isfinite(number) or not inside:
             bracket = "(" if self.open_low else "["
             raise ConfigError(
                 f"{owner}: {self.name} is {number:g} {self.unit}; "
-                f"allowed is {bracket}{self.low:g}, {self.high:g}]",
+                f"allowed is {bracket}{self.low:g}, {high:g}]",
                 key=(self.name,),
             )
         if self.choice and number not in (self.low, self.high):
@@ -203,7 +209,7 @@ class Effect:
                     f"{self.name}: parameter {parameter.name!r} ({parameter.unit}) is missing",
                     key=(parameter.name,),
                 )
-            self.values[parameter.name] = parameter.check(value, self.name)
+            self.values[parameter.name] = parameter.check(value, self.name, self.form)
 
     def _form(self, form: Any) -> str:
         """Take the kernel of `form`, None for the first; return its name, "" where there is one form only."""

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rtcomp import physics
+from rtcomp.errors import ConfigError
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.physics.rows import motion_rows, over_rows
 from rtcomp.physics.slow import FRESH
@@ -114,11 +115,16 @@ def test_noise_within_the_grain_does_not_ratchet():
 
 @settings(max_examples=25, deadline=None)
 @given(
-    corners=st.lists(st.floats(-6e-6, 6e-6), min_size=1, max_size=6), softening=st.floats(-0.9, 0.9),
+    corners=st.lists(st.floats(-6e-6, 6e-6), min_size=1, max_size=6),
+    bent=st.one_of(
+        st.tuples(st.just("force"), st.floats(-0.9, 0.9)),
+        st.tuples(st.just("elements"), st.floats(-0.9, 9.0)),
+    ),
     inner=st.floats(0.05, 0.95),
-)  # fmt: skip
-def test_bent_loops_close_and_dissipate(corners, softening, inner):
-    bend = effect("non-congruent-friction", softening=softening)
+)
+def test_bent_loops_close_and_dissipate(corners, bent, inner):
+    form, softening = bent
+    bend = effect("non-congruent-friction", form=form, softening=softening)
     start = path(8e-6, *corners, -9e-6, step=5e-8)
     outer = start[-1] + inner * 8e-6
     x = np.concatenate(
@@ -128,7 +134,14 @@ def test_bent_loops_close_and_dissipate(corners, softening, inner):
     closed = slice(len(start) - 1, len(x))
     assert f[-1] == pytest.approx(f[len(start) - 1], abs=1e-9)
     assert work(x[closed], f[closed]) >= -1e-12
-    assert np.max(np.abs(f)) <= BANK.level * (1 + 1e-12)
+    if softening <= 1.0:
+        assert np.max(np.abs(f)) <= BANK.level * (1 + 1e-12)
+
+
+def test_only_elements_may_be_softer_than_level_where_they_yield():
+    with pytest.raises(ConfigError, match=r"softening is 2 1; allowed is \[-1, 1\]"):
+        effect("non-congruent-friction", softening=2.0)
+    assert effect("non-congruent-friction", form="elements", softening=2.0).values["softening"] == 2.0
 
 
 def test_equal_reversals_at_different_force_have_different_loops_only_when_bent():
