@@ -275,10 +275,9 @@ class ForceBalance(Signals):
         for s, p in zip(self.data.segments, self.paths(sensors), strict=True):
             held = self._given(s)
             parts = parts_of_drive(chain) if self.data.held else 1
-            over = forces(stage, chain, s.time, p.x, p.v, p.a, held, parts=parts).drive
+            over = forces(stage, chain, s.time, p.x, p.v, p.a, held, parts=parts)
             f = forces(stage, stage.chain, s.time, p.x, p.v, p.a, held, self.grain)
-            mean = 0.5 * (over + np.append(over[1:], over[-1:])) if self.data.held else around_rows(over)
-            given.append(mean)
+            given.append(over.held_drive() if self.data.held else around_rows(over.drive))
             needed.append(f.mass * p.measured - f.others())
         return self.smooth(given), self.smooth(needed)
 

@@ -99,7 +99,8 @@ def _free_of(terms: Sequence[Term], balance: ForceBalance, *, sizes: bool) -> li
                 # Beyond the motion's bandwidth nothing swings that the recording could show.
                 most = min(p.high, balance.noise.bandwidth)
                 step = min(0.02, 0.01 / (value * balance.data.seconds)) if waves else step
-            elif p.unit == "s":
+            elif p.unit == "s" and p.name not in (kind.neutral or {}):
+                # A scale shorter than a row is no finding; a size may be as small as it is.
                 least = max(p.lowest, min(balance.data.period, value))
             elif p.unit == "m" and p.lowest < 0.0 and p.name not in kind.linear:
                 step = 0.002 * (high - low)

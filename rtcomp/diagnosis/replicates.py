@@ -94,11 +94,12 @@ def _by_chance(fitted: Fitted, screen: Screen, seed: int, count: int) -> Floats:
     """Return the largest gains (R,) on phase-randomised surrogates of the residual.
 
     A surrogate has the spectrum of the residual and random phases, so it is independent of the motion
-    (Theiler and others 1992, Physica D 58).
+    (Theiler and others 1992, Physica D 58). It has no mean: a constant is nothing that chance makes.
     """
     random = np.random.default_rng(seed)
     columns = free_columns(fitted)
     size = np.abs(np.fft.rfft(fitted.residual))
+    size[0] = 0.0
     phases = random.random((count, size.size))
 
     def one(phase: Floats) -> float:

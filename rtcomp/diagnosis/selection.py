@@ -13,11 +13,13 @@ from rtcomp.diagnosis.baseline import settle
 from rtcomp.diagnosis.candidates import Candidate, candidates
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
+from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.growing import grow
 from rtcomp.diagnosis.replicates import best, free_columns, null_of
 from rtcomp.diagnosis.screening import Screen, Screened
 from rtcomp.diagnosis.settings import BEAM, LEAST_GAIN, LEVEL, MOST_EFFECTS
 from rtcomp.diagnosis.significance import Null
+from rtcomp.diagnosis.stage_of import bias_entry
 
 NEAR = 1.0
 """Logarithm of the error over the best one's, up to which a model is an alternative, and grown beside it."""
@@ -122,6 +124,8 @@ def search(
             break
     if found.elsewhere:
         _settled_on_chosen(fitter, found)
+    if fitter.offset and found.chosen.terms:
+        _offset_judged(fitter, found)
     _solid(fitter, found)
     return found
 
@@ -162,6 +166,20 @@ def _skipped(found: Search, cut: bool) -> None:
 
 def _further(model: Fitted) -> str:
     return f"all further effects beside {' and '.join(ent.names(model.entries)) or 'the belief'}"
+
+
+def _offset_judged(fitter: Fitter, found: Search) -> None:
+    """Name the constant force that stood beside all models, where it passes the test beside the chosen one.
+
+    Beside the belief alone it may be little of what there is, and beside what explains the rest much.
+    """
+    fitter.offset = False
+    baseline, without = fitter.fit([]), fitter.fit(found.chosen.terms, found.chosen)
+    named = fitter.fit([*found.chosen.terms, Term.of(bias_entry(1.0))], found.chosen)
+    if not accepted(fitter, named, without, found.null, float(baseline.errors.sum())):
+        fitter.offset = True
+        return
+    found.baseline, found.chosen, found.alternatives, found.beside = baseline, named, [], None
 
 
 def _solid(fitter: Fitter, found: Search) -> None:

@@ -155,8 +155,8 @@ class Signals:
         for s, p in zip(self.data.segments, self.paths(sensors), strict=True):
             parts = parts_of_drive(chain) if self.data.held else 1
             f = forces(self.stage, chain, s.time, p.x, p.v, p.a, self._given(s), parts=parts)
-            mean = 0.5 * (f.drive + np.append(f.drive[1:], f.drive[-1:]))
-            found.append((mean if self.data.held else around_rows(f.drive)) + around_rows(f.push))
+            driven = f.held_drive() if self.data.held else around_rows(f.drive)
+            found.append(driven + around_rows(f.push))
         return found
 
     def _base(

@@ -53,6 +53,13 @@ class Forces:
     rising: Floats
     falling: Floats
     """Push less friction over the row before each, weighed by what has passed of it, by what is to come."""
+    drive_rising: Floats
+    drive_falling: Floats
+    """The same of the drive's force."""
+
+    def held_drive(self) -> Floats:
+        """Return the force of a drive whose command is held, (K,) N, as second differences see it."""
+        return self.drive_rising + np.append(self.drive_falling[1:], self.drive_falling[-1:])
 
     def others(self) -> Floats:
         """Return push less friction, (K,) N, as second differences see it: its mean around each row."""
@@ -95,7 +102,7 @@ def forces(
     remembers), the others are those at the row.
     """
     program = Program([e for e in chain if e.place is not Place.SENSOR])
-    out = np.zeros((6, time.size))
+    out = np.zeros((8, time.size))
     row = float((time[-1] - time[0]) / max(time.size - 1, 1))
     needed = parts_of(chain, row)
     motion = np.ascontiguousarray(np.column_stack([time, position, velocity, acceleration, volts]))
@@ -157,7 +164,7 @@ def _along(
 ) -> None:  # fmt: skip
     """Fill `out`: the mean of the drive's force over the row's parts, the rest as it is at the row's end.
 
-    Where effects are so `fast` that they change within a row, also the weighed means of the others' force.
+    And the weighed means of the drive's force; of the others' where effects change so `fast`, within a row.
     """
     last = 0.0
     for k in range(motion.shape[0]):
@@ -166,14 +173,17 @@ def _along(
             along_row(w, motion, k, j - 0.5 if middle else float(j), parts)
             renew(w, base[0], base[1])
             run_chain(steps, p, s, w, 0, steps[0])
-            drive += w[DRIVE] / parts
+            passed, force = (j - 0.5) / parts, w[DRIVE] / parts
+            drive += force
+            out[6, k] += force * passed
+            out[7, k] += force * (1.0 - passed)
             if fast:
                 # Forces are those at the end of a part: over it, the mean of both its ends.
                 now = w[PUSH] - w[FRICTION]
                 share = 0.5 * (last + now) / parts
                 last = now
-                out[4, k] += share * (j - 0.5) / parts
-                out[5, k] += share * (1.0 - (j - 0.5) / parts)
+                out[4, k] += share * passed
+                out[5, k] += share * (1.0 - passed)
         if middle:
             along_row(w, motion, k, float(parts), parts)
             renew(w, base[0], base[1])
@@ -207,8 +217,8 @@ def force_balance(
 ) -> Balance:
     """Return both sides of the balance on a recording: rows equally spaced, voltage held from row to row.
 
-    The force around a row is the mean of those before and after it, as the second difference of position
-    is of the accelerations. Friction's memory and the acceleration come from the position as it was
+    The force around a row is weighed over the rows before and after it, as the second difference of position
+    weighs the accelerations. Friction's memory and the acceleration come from the position as it was
     measured, the velocity from below three times `bandwidth_hz`, and both sides are compared below it,
     forward and backward filtered: no delay. What the stage's sensor does to a reading is undone first.
     """
@@ -232,8 +242,7 @@ def balance_along(
     motion = forces(stage, stage.chain, time, position, velocity, acceleration, held, grain)
     needed = motion.mass * acceleration - motion.others()
     parts = parts_of_drive(drive)
-    over = forces(stage, drive, time, position, velocity, acceleration, held, parts=parts).drive
-    given = 0.5 * (over + np.append(over[1:], over[-1:]))
+    given = forces(stage, drive, time, position, velocity, acceleration, held, parts=parts).held_drive()
     return Balance(zero_phase(given, cut, 1.0 / period), zero_phase(needed, cut, 1.0 / period), cut)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import math
 import weakref
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,13 +18,14 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.acceptance import doubts
 from rtcomp.diagnosis.balance import ForceBalance, reserved_blocks
 from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.candidates import Candidate
+from rtcomp.diagnosis.candidates import Candidate, candidates
 from rtcomp.diagnosis.data import MOST_ROWS, load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.other_forms import overtones
 from rtcomp.diagnosis.regression import Grams
 from rtcomp.diagnosis.replicate import replicate
+from rtcomp.diagnosis.replicates import null_of
 from rtcomp.diagnosis.screening import Screen
 from rtcomp.diagnosis.significance import Null, confidence_set, log_gain, probabilities
 from rtcomp.diagnosis.spectrum import filtered, spectrum
@@ -146,6 +148,18 @@ def test_a_gain_like_those_of_replicates_is_chance_and_a_larger_one_is_not() -> 
     assert null.p_value(0.06) < 0.001
     assert null.p_value(null.threshold(0.01)) == pytest.approx(0.01, rel=1e-3)
     assert null.p_of_error(np.full(10, 100.0)) > 0.2 and null.p_of_error(np.full(10, 120.0)) < 0.01
+
+
+def test_chance_makes_no_constant_force() -> None:
+    """A residual that is constant but for noise: surrogates of it have the noise alone."""
+    balance = ForceBalance(stage(), load_data([run(stage(), there_and_back())]))
+    fitter, base = Fitter(balance), baseline(balance)
+    constant = [c for c in candidates(fitter, base) if c.name == "constant-force"]
+    screen = Screen(constant, fitter.block, fitter.blocks, fitter.use)
+    noise = np.random.default_rng(3).standard_normal(base.residual.size)
+    constantly = replace(base, residual=noise + 3.0)
+    null = null_of(fitter, constantly, screen, gain=2.0, seed=0)
+    assert null.gains.max() < 0.2
 
 
 def test_a_replicate_that_went_another_way_in_one_block_hides_no_error_in_all_others() -> None:

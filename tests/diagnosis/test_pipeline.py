@@ -81,6 +81,23 @@ def test_two_effects_are_both_named() -> None:
     assert found.stage.to_dict()["stage"]["effects"]
 
 
+def test_a_constant_force_that_a_stronger_effect_outshines_is_named_beside_it() -> None:
+    ripple = {"name": "torque-ripple", "amplitude": 0.3, "period": 5e-5, "phase": 1.0}
+    found = answer(stage(), ripple, {"name": "constant-force", "force": 0.08})
+    first, second = names(found)
+    assert first == ("torque-ripple",) and "constant-force" in second
+
+
+@pytest.mark.parametrize("name", ["drive-lag", "drive-delay"])
+def test_a_time_shorter_than_a_row_is_found(name: str) -> None:
+    time = "delay" if name == "drive-delay" else "time_constant"
+    found = answer(stage(), {"name": name, time: 0.4 / RATE})
+    (named,) = found.effects
+    assert name in named.names
+    if named.names[0] == name:
+        assert named.parameters[time].value == pytest.approx(0.4 / RATE, rel=0.1)
+
+
 def test_what_no_entry_explains_is_not_given_a_name() -> None:
     """A bump of force at one place of the stroke, as a foreign body on a guide makes it."""
     bump = {
