@@ -95,11 +95,14 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
     """Return why each effect of a model is no finding.
 
     Its size may be nothing, a number of it is at a physical bound, or more is left beside it than noise and a
-    part of what there is without it: what else makes the rest may make that part as well.
+    part of what there is without it: what else makes the rest may make that part as well. What replicates of
+    the model leave too is not counted as left.
     """
     said = []
     louder = fitter.louder(chosen)
     more = null is not None and null.p_of_error(chosen.errors) < LEVEL
+    noise = null.noise if null is not None else 0.0
+    beyond = max(1.0 - noise / max(float(chosen.errors.sum()), 1e-300), 0.0)
     for i, span in enumerate(told(fitter, chosen)):
         why = "its size may be nothing" if span.nothing else ""
         why = f"{', '.join(span.bound)} at its bound" if span.bound else why
@@ -109,7 +112,7 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
             # A wave of any form is the same effect: what only makes its form another is not left.
             rest = in_any_form(fitter, chosen, fitter.overtones(chosen, i))
             left, there = (fitter.above_noise(model, louder) ** 2 for model in (rest, without))
-            left /= max(there, 1e-300)
+            left *= beyond / max(there, 1e-300)
             why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""
         said.append(Doubt(why, left))
     return said
