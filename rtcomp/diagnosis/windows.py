@@ -50,14 +50,17 @@ class Windows:
         rows = min(rows, max(LEAST_ROWS, sum(s.time.size for s in data.segments) // (2 * balance.blocks)))
         starts, blocks, before = [], [], 0
         for s in data.segments:
-            kept = balance.whitening.rows(s)
-            count = s.time[kept].size
-            first = np.arange(kept.start, min(kept.stop, s.time.size - rows), rows)
-            number = [np.clip((k - kept.start) // kept.step, 0, count - 1) for k in (first, first + rows - 1)]
-            own, end = (balance.block[before + n] for n in number)
-            starts.append(first[own == end])
-            blocks.append(own[own == end])
-            before += count
+            at = np.arange(s.time.size)[balance.whitening.rows(s)]
+            own = balance.block[before : before + at.size]
+            before += at.size
+            first, number = [], []
+            for block in np.unique(own).tolist():
+                within = at[own == block]
+                some = np.arange(within[0], min(within[-1] + 2, s.time.size) - rows, rows)
+                first.append(some)
+                number.append(np.full(some.size, block))
+            starts.append(np.concatenate(first))
+            blocks.append(np.concatenate(number))
         thin = max(1, -(-sum(s.size for s in starts) // MOST_WINDOWS))
         reserved = balance.reserved[np.concatenate([b[::thin] for b in blocks])]
         return cls(balance, [s[::thin] for s in starts], rows, reserved)

@@ -118,6 +118,18 @@ def test_friction_that_is_little_beside_a_spring_hides_nothing() -> None:
     assert part_untold(sprung, [recorded(sprung)]) < 0.1 * MUCH
 
 
+def test_no_block_is_without_windows() -> None:
+    """Short recordings, in which a window is more than half as long as a block."""
+    for seconds in (8.0, 10.0, 14.0):
+        balance = balanced(stage(), [recorded(stage(), seconds)])
+        windows = Windows.of(balance)
+        rows = np.concatenate(
+            [np.arange(s.time.size)[balance.whitening.rows(s)] for s in balance.data.segments]
+        )
+        own = balance.block[np.searchsorted(rows, windows.starts[0])]
+        assert set(own) == set(range(balance.blocks)) and windows.reserved.any()
+
+
 def test_windows_lie_apart_and_those_of_reserved_blocks_are_a_group_of_their_own(
     loaded: list[Recording],
 ) -> None:
