@@ -7,15 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.candidates import candidates
+from rtcomp.diagnosis.candidates import Candidate, candidates, started
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.replicate import replicate
-from rtcomp.diagnosis.screening import Screen
+from rtcomp.diagnosis.screening import Screen, Screened
 from rtcomp.diagnosis.settings import REPLICATES
-from rtcomp.diagnosis.significance import Null
+from rtcomp.diagnosis.significance import Null, log_gain
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
@@ -49,33 +49,49 @@ def null_of(fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: i
     names = ent.names(fitted.entries)
     events = any(ent.happens_once(ent.kind_of(c.term.entry)) for c in screen.candidates)
 
-    def one(number: int) -> tuple[float, Floats] | None:
+    def one(number: int) -> tuple[float, float, Floats] | None:
         data = replicate(stage, balance.data, motion, noise, 1000 * seed + number)
         if data is None:
             return None
         other = fitter.on(data)
         again = other.fit(list(fitted.terms), fitted, steps=0)
-        gains = screen.gains(free_columns(again), again.residual)
+        gains = list(zip(screen.candidates, screen.gains(free_columns(again), again.residual), strict=True))
         # Its own size is all that a single event has: the largest of these residuals, not of the recorded.
         made = candidates(other, again, names, events=True) if events else []
         if made:
-            gains += Screen(made, other.block, other.blocks, other.use).gains(
-                free_columns(again), again.residual
-            )
+            look = Screen(made, other.block, other.blocks, other.use)
+            gains += zip(made, look.gains(free_columns(again), again.residual), strict=True)
         scale = fitter.power / max(other.power, 1e-300)
-        return max((s.gain for s in gains), default=0.0), again.errors * scale
+        gain, fully = _largest(other, again, gains)
+        return gain, fully, again.errors * scale
 
-    found: list[tuple[float, Floats]] = []
+    found: list[tuple[float, float, Floats]] = []
     for first, last in ((0, FEW), (FEW, REPLICATES)):
         found += [f for f in shared(one, range(first, last)) if f is not None]
         if len(found) < FEW // 2:
             return _surrogates(fitter, fitted, screen, seed)
-        gains, errors = (np.array(each) for each in zip(*found, strict=True))
+        gains, fully, errors = (np.array(each) for each in zip(*found, strict=True))
         by_chance = _by_chance(fitted, screen, seed, gains.size)
-        null = Null(_mixed(fitted, gains, errors.sum(axis=1), by_chance), errors)
+        by_chance *= float(np.median(fully / np.maximum(gains, 1e-300)))  # a refit adds as much to these
+        null = Null(_mixed(fitted, fully, errors.sum(axis=1), by_chance), errors)
         if null.plain(gain, fitted.errors):
             break
     return null
+
+
+def _largest(
+    fitter: Fitter, model: Fitted, gains: Sequence[tuple[Candidate, Screened]]
+) -> tuple[float, float]:
+    """Return the largest of the gains beside a model, to first order and with its candidate fitted in full."""
+    if not gains:
+        return 0.0, 0.0
+    candidate, screened = max(gains, key=lambda one: one[1].gain)
+    gain = max(screened.gain, 0.0)
+    try:
+        larger = fitter.fit([*model.terms, started(candidate, screened.sizes)], model)
+    except (ConfigError, np.linalg.LinAlgError):
+        return gain, gain
+    return gain, max(gain, log_gain(model.errors, larger.errors))
 
 
 def _mixed(fitted: Fitted, gains: Floats, errors: Floats, by_chance: Floats) -> Floats:
