@@ -24,6 +24,7 @@ from rtcomp.diagnosis.reaches import MOST_OWN, joined
 from rtcomp.diagnosis.settings import BLOCK_REVERSALS, BLOCK_SECONDS, RESERVED_EVERY
 from rtcomp.diagnosis.signals import BASE, Signals, key_of
 from rtcomp.diagnosis.spectrum import filtered, spectrum
+from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Place
 from rtcomp.stage.balance import around_rows, forces, parts_of_drive
@@ -201,12 +202,16 @@ class ForceBalance(Signals):
 
         The density of a command is that of its residual times their derivative: a model whose drive side is
         smaller, or whose friction takes up whatever the drive gives (`by_load`), has explained nothing by it.
+        Raises ConfigError where nothing is left of it.
         """
         told = y if by_load is None else y - self._whitened(by_load)[0]
         plain = self._plain_drive()
         if told is plain or self._whitening is None:
             return 1.0
-        return float(np.sqrt(max(self._swing(plain) / max(self._swing(told), 1e-300), 1.0)))
+        whole, left = self._swing(plain), self._swing(told)
+        if left < 1e-18 * whole:  # rounding
+            raise ConfigError("with these values the drive gives no force along the recording")
+        return float(np.sqrt(max(whole / left, 1.0)))
 
     def _groups(
         self, entries: Sequence[Entry], weights: Floats | None

@@ -14,6 +14,7 @@ from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.other_forms import in_any_form
 from rtcomp.diagnosis.replicates import best, free_columns
 from rtcomp.diagnosis.screening import Screen
 from rtcomp.diagnosis.selection import Search
@@ -56,7 +57,7 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         chosen, i = found.chosen, len(done)
         rest = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
         models = [chosen, *_others(fitter, found, i, rest, ends)]
-        errors = [_by_cell(fitter, m) for m in models]
+        errors = [_by_cell(fitter, m, i if m is chosen else len(m.terms) - 1) for m in models]
         weight = probabilities(errors, _independent(fitter, chosen) / errors[0].size)
         alike = confidence_set(errors, SET_LEVEL)
         plainer = min(alike, key=lambda k: (models[k].size, -weight[k]))
@@ -86,11 +87,13 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
     return done
 
 
-def _by_cell(fitter: Fitter, model: Fitted) -> Floats:
+def _by_cell(fitter: Fitter, model: Fitted, at: int) -> Floats:
     """Return the squared error of a model in every cell that is not reserved, (C,).
 
     What acts now and then, as a drive's limit, shows in some of them: of ten blocks it would be by chance.
+    A wave in the place `at` is compared in any form.
     """
+    model = in_any_form(fitter, model, fitter.overtones(model, at))
     block = fitter.block
     cell = np.arange(block.size) * (fitter.blocks * CELLS) // block.size
     used = fitter.use[block]

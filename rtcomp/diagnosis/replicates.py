@@ -82,7 +82,7 @@ def null_of(fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: i
 def _largest(
     fitter: Fitter, model: Fitted, gains: Sequence[tuple[Candidate, Screened]]
 ) -> tuple[float, float]:
-    """Return the largest of the gains beside a model, to first order and with its candidate fitted in full."""
+    """Return the largest of the gains beside a model, to first order and with that candidate fitted."""
     if not gains:
         return 0.0, 0.0
     candidate, screened = max(gains, key=lambda one: one[1].gain)

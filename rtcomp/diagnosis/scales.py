@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.fft
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import ForceBalance
@@ -66,7 +67,7 @@ class Scales:
             (4.0 / data.seconds, min(0.4 * data.rate, balance.noise.bandwidth)),
             float(np.sqrt(np.mean(force**2))),
             _periods(balance, force, rest),
-            _tones(balance, rest),
+            tones_of(balance, rest),
             _moments(balance, rest),
         )
 
@@ -134,13 +135,20 @@ def _periods(balance: ForceBalance, force: Floats, residual: Floats) -> Floats:
     return np.asarray(periods[np.concatenate([[True], np.diff(np.log(periods)) > 0.02])])
 
 
-def _tones(balance: ForceBalance, residual: Floats) -> Floats:
-    """Return frequencies (Hz) of the strongest lines of the residual in time."""
-    rate = balance.data.rate / balance.whitening.thinning
-    size = residual.size
-    power = np.abs(np.fft.rfft(residual * np.hanning(size), 4 * size)) ** 2
-    frequency = np.asarray(np.arange(power.size) * (rate / (4 * size)), dtype=np.float64)
-    some = (frequency > 3.0 * rate / size) & (frequency < 0.45 * rate)
+def tones_of(balance: ForceBalance, residual: Floats) -> Floats:
+    """Return frequencies (Hz) of the strongest lines of the residual in time.
+
+    A tone goes on between segments: each stands at its own time, and what is between them is nothing.
+    """
+    rate, segments = balance.data.rate, balance.data.segments
+    times = [s.time[balance.whitening.rows(s)] for s in segments]
+    at = np.round((np.concatenate(times) - min(t[0] for t in times)) * rate).astype(np.int64)
+    line = np.bincount(at, residual * np.concatenate([np.hanning(t.size) for t in times]))
+    count = scipy.fft.next_fast_len(2 * line.size, real=True)
+    power = np.abs(scipy.fft.rfft(line, count)) ** 2
+    frequency = np.asarray(np.arange(power.size) * (rate / count), dtype=np.float64)
+    slow, fast = rate / line.size, rate / balance.whitening.thinning
+    some = (frequency > 3.0 * slow) & (frequency < 0.45 * fast)
     lines: list[float] = highest(frequency[some], np.asarray(power[some], dtype=np.float64), PEAKS + 2, 0.01)
     return np.sort(np.array(lines))
 

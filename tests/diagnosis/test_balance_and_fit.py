@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recorded import cut, run, stage, there_and_back
+from recorded import RATE, cut, run, stage, there_and_back
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.acceptance import doubts
@@ -26,13 +26,14 @@ from rtcomp.diagnosis.other_forms import overtones
 from rtcomp.diagnosis.regression import Grams
 from rtcomp.diagnosis.replicate import replicate
 from rtcomp.diagnosis.replicates import null_of
+from rtcomp.diagnosis.scales import tones_of
 from rtcomp.diagnosis.screening import Screen
 from rtcomp.diagnosis.significance import Null, confidence_set, log_gain, probabilities
 from rtcomp.diagnosis.spectrum import filtered, spectrum
 from rtcomp.diagnosis.stage_of import stage_of
 from rtcomp.diagnosis.validation import Reserved
 from rtcomp.diagnosis.where import as_force
-from rtcomp.errors import RecordingError
+from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, catalogue
 from rtcomp.stage.balance import between_rows
@@ -148,6 +149,25 @@ def test_a_gain_like_those_of_replicates_is_chance_and_a_larger_one_is_not() -> 
     assert null.p_value(0.06) < 0.001
     assert null.p_value(null.threshold(0.01)) == pytest.approx(0.01, rel=1e-3)
     assert null.p_of_error(np.full(10, 100.0)) > 0.2 and null.p_of_error(np.full(10, 120.0)) < 0.01
+
+
+@pytest.mark.parametrize("frequency", [3.37, 52.89, 111.13])
+def test_a_tone_is_found_through_gaps(frequency: float) -> None:
+    """Of a long recording windows are taken: lines are as narrow as all of it is long."""
+    seconds = 1.6 * MOST_ROWS / RATE
+    balance = ForceBalance(stage(), load_data([run(stage(), there_and_back(seconds))]))
+    baseline(balance)
+    assert len(balance.data.segments) > 1
+    time = balance.plain([s.time for s in balance.data.segments])
+    found = tones_of(balance, np.sin(2.0 * np.pi * frequency * time + 0.7))
+    assert np.min(np.abs(found - frequency)) < 0.25 / seconds
+
+
+def test_a_drive_that_gives_nothing_is_no_model() -> None:
+    balance = ForceBalance(stage(), load_data([run(stage(), there_and_back())]))
+    base, fitter = baseline(balance), Fitter(balance)
+    with pytest.raises(ConfigError, match="gives no force"):
+        fitter.fit([Term.of({"name": "drive-deadband", "width": 9.0})], base)
 
 
 def test_chance_makes_no_constant_force() -> None:
