@@ -62,7 +62,7 @@ def null_of(fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: i
             look = Screen(made, other.block, other.blocks, other.use)
             gains += zip(made, look.gains(free_columns(again), again.residual), strict=True)
         scale = fitter.power / max(other.power, 1e-300)
-        gain, fully = _largest(other, again, gains)
+        gain, fully = largest(other, again, gains)
         return gain, fully, again.errors * scale
 
     found: list[tuple[float, float, Floats]] = []
@@ -79,7 +79,7 @@ def null_of(fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: i
     return null
 
 
-def _largest(
+def largest(
     fitter: Fitter, model: Fitted, gains: Sequence[tuple[Candidate, Screened]]
 ) -> tuple[float, float]:
     """Return the largest of the gains beside a model, to first order and with that candidate fitted."""

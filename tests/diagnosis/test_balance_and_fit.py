@@ -25,7 +25,7 @@ from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.other_forms import overtones
 from rtcomp.diagnosis.regression import Grams
 from rtcomp.diagnosis.replicate import replicate
-from rtcomp.diagnosis.replicates import null_of
+from rtcomp.diagnosis.replicates import free_columns, largest, null_of
 from rtcomp.diagnosis.scales import tones_of
 from rtcomp.diagnosis.screening import Screen
 from rtcomp.diagnosis.significance import Null, confidence_set, log_gain, probabilities
@@ -161,6 +161,21 @@ def test_a_tone_is_found_through_gaps(frequency: float) -> None:
     time = balance.plain([s.time for s in balance.data.segments])
     found = tones_of(balance, np.sin(2.0 * np.pi * frequency * time + 0.7))
     assert np.min(np.abs(found - frequency)) < 0.25 / seconds
+
+
+def test_the_largest_gain_is_that_of_a_fit() -> None:
+    """A dead zone is not in proportion to its width: first order tells a part of its gain only."""
+    hidden = stage(effects=[{"name": "drive-deadband", "width": 0.3}])
+    balance = ForceBalance(stage(), load_data([run(hidden, there_and_back())]))
+    base, fitter = baseline(balance), Fitter(balance)
+    made = [c for c in candidates(fitter, base) if c.name == "drive-deadband"]
+    screen = Screen(made, fitter.block, fitter.blocks, fitter.use)
+    screened = screen.gains(free_columns(base), base.residual)
+    first, fully = largest(fitter, base, list(zip(made, screened, strict=True)))
+    right = fitter.fit([Term.of({"name": "drive-deadband", "width": 0.3})], base)
+    assert first == max(s.gain for s in screened) < fully
+    assert fully == pytest.approx(log_gain(base.errors, right.errors), rel=0.02)
+    assert largest(fitter, base, []) == (0.0, 0.0)
 
 
 def test_a_drive_that_gives_nothing_is_no_model() -> None:
