@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -31,12 +33,15 @@ def free_columns(fitted: Fitted) -> Floats:
     return np.concatenate([fitted.system.columns[free], fitted.tangents])
 
 
-def null_of(fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: int) -> Null:
+def null_of(
+    fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: int, ends: float = math.inf
+) -> Null:
     """Return the null distribution beside a fitted model.
 
     Replicates are drawn until it is plain whether `gain` and the error of the fit are beyond them: sequential
     Monte Carlo (Besag and Clifford 1991, Biometrika 78(2)). A model that cannot be kept on the recorded
-    motion is judged by surrogates of its residual instead.
+    motion is judged by surrogates of its residual instead. After the time `ends` (time.monotonic) gains are
+    those of first order.
     """
     balance = fitter.balance
     try:
@@ -62,7 +67,7 @@ def null_of(fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: i
             look = Screen(made, other.block, other.blocks, other.use)
             gains += zip(made, look.gains(free_columns(again), again.residual), strict=True)
         scale = fitter.power / max(other.power, 1e-300)
-        gain, fully = largest(other, again, gains)
+        gain, fully = largest(other, again, gains, ends)
         return gain, fully, again.errors * scale
 
     found: list[tuple[float, float, Floats]] = []
@@ -80,13 +85,15 @@ def null_of(fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: i
 
 
 def largest(
-    fitter: Fitter, model: Fitted, gains: Sequence[tuple[Candidate, Screened]]
+    fitter: Fitter, model: Fitted, gains: Sequence[tuple[Candidate, Screened]], ends: float = math.inf
 ) -> tuple[float, float]:
-    """Return the largest of the gains beside a model, to first order and with that candidate fitted."""
+    """Return the largest of the gains beside a model, to first order and, before `ends`, in a full fit."""
     if not gains:
         return 0.0, 0.0
     candidate, screened = max(gains, key=lambda one: one[1].gain)
     gain = max(screened.gain, 0.0)
+    if time.monotonic() > ends:
+        return gain, gain
     try:
         larger = fitter.fit([*model.terms, started(candidate, screened.sizes)], model)
     except (ConfigError, np.linalg.LinAlgError):

@@ -275,7 +275,7 @@ def _judged(
         first = Look([], [], Screen([], fitter.block, fitter.blocks, fitter.use), None)
     seen = first or look(fitter, model, ends)
     say(0.5, what)
-    return replace(seen, null=null_of(fitter, model, seen.screen, seen.gain, seed))
+    return replace(seen, null=null_of(fitter, model, seen.screen, seen.gain, seed, ends))
 
 
 def _sound(seen: Look, parent: float) -> Look | None:
