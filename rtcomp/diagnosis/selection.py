@@ -176,8 +176,9 @@ def _offset_judged(fitter: Fitter, found: Search) -> None:
     fitter.offset = False
     baseline, without = fitter.fit([]), fitter.fit(found.chosen.terms, found.chosen)
     named = fitter.fit([*found.chosen.terms, Term.of(bias_entry(1.0))], found.chosen)
-    if not accepted(fitter, named, without, found.null, float(baseline.errors.sum())):
-        fitter.offset = True
+    passed = accepted(fitter, named, without, found.null, float(baseline.errors.sum()))
+    if not passed or doubts(fitter, named, found.null)[-1].why:
+        fitter.offset = True  # it stays what stands beside every model
         return
     found.baseline, found.chosen, found.alternatives, found.beside = baseline, named, [], None
 
