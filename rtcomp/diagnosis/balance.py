@@ -116,10 +116,10 @@ class ForceBalance(Signals):
         self._reserved = reserved_blocks(self.blocks, stepped, self._still(), self._furthest())
 
     def _still(self) -> set[int]:
-        """Return the blocks in which the command hardly varies but for noise: they could judge nothing."""
-        volts = self.smooth([s.voltage for s in self.data.segments])
-        least = LEAST_FORCE * float(np.std(volts))
-        return {k for k in range(self.blocks) if float(np.std(volts[self.block == k])) < least}
+        """Return the blocks in which the drive's force hardly varies: they could judge nothing."""
+        force = self.drive_force()
+        least = LEAST_FORCE * float(np.std(force))
+        return {k for k in range(self.blocks) if float(np.std(force[self.block == k])) < least}
 
     def _furthest(self) -> set[int]:
         """Return the blocks in which command, position and speed are lowest and highest."""

@@ -208,13 +208,13 @@ def _candidate(
             change = fitter.change(fitted, entry)[None, :]
             return _finite(Candidate(Term.of(entry), (entry,), change, np.zeros(1), np.full(1, np.inf)))
         p = ent.parameter(kind, linear)
-        step = _step(p, fitter.balance)
+        step, most = _step(p, fitter.balance), ent.highest(entry, p)
         phases = [p.name for p in kind.parameters if p.unit == ent.PHASE]
         if _waves_of(kind, linear):
             parts = [{**entry, linear: step, phases[0]: angle} for angle in (0.0, 0.5 * np.pi)]
             free = frozenset(q.name for q in kind.parameters if q.name in entry and q.name not in kind.linear)
             term = Term(entry, free | {linear})
-            low, high = np.full(2, -p.high / step), np.full(2, p.high / step)
+            low, high = np.full(2, -most / step), np.full(2, most / step)
         else:
             parts = [{**entry, linear: step}]
             dead = {p.name for p in kind.parameters if p.unit == ent.PHASE or p.name == ent.PERIOD}
@@ -222,7 +222,7 @@ def _candidate(
             term = Term(entry, frozenset(own - set(kind.linear) - (dead if phases else set())) | {linear})
             low, high = (
                 np.array([(p.lowest - entry[linear]) / step]),
-                np.array([(p.high - entry[linear]) / step]),
+                np.array([(most - entry[linear]) / step]),
             )
         columns = np.array([fitter.change(fitted, part) for part in parts])
         return _finite(Candidate(term, tuple(parts), columns, low, high))
@@ -259,7 +259,7 @@ def started(candidate: Candidate, sizes: Floats) -> Term:
         p = ent.parameter(kind, name)
         neutral = float(entry[name])
         value = neutral + float(sizes[0]) * (float(candidate.parts[0][name]) - neutral)
-        out[name] = min(max(value, 0.9 * p.lowest), 0.9 * p.high)
+        out[name] = min(max(value, 0.9 * p.lowest), 0.9 * ent.highest(entry, p))
     return candidate.term.with_entry(out)
 
 

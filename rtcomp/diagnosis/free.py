@@ -87,7 +87,7 @@ def _free_of(terms: Sequence[Term], balance: ForceBalance, *, sizes: bool) -> li
         for p in [*own, *ent.free_parameters(term.entry, linear=False)]:
             if p.name not in term.free:
                 continue
-            value, least, most = float(term.entry[p.name]), p.lowest, p.high
+            value, least, most = float(term.entry[p.name]), p.lowest, ent.highest(term.entry, p)
             log = p.lowest >= 0.0 and value > 0.0
             step = 0.02 if log else max(0.02 * abs(value), 1e-9 * (high - low if p.unit == "m" else 1.0))
             if p.unit == ent.PHASE:

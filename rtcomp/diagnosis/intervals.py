@@ -68,7 +68,7 @@ def told(fitter: Fitter, fitted: Fitted) -> list[Told]:
                     bound.append(p.name)
             elif p.name == ent.MOMENT:
                 half = balance.data.period
-            low, high = max(value - half, p.low), min(value + half, p.high)
+            low, high = max(value - half, p.low), min(value + half, ent.highest(term.entry, p))
             values[p.name] = Value(value, low, high, for_axis(p.unit, axis))
             if p.name in kind.linear and p.name in without:
                 spread = max(_deviation(alone[p.name] - value), once.get(p.name, 0.0))

@@ -77,7 +77,9 @@ def null_of(
             return _surrogates(fitter, fitted, screen, seed)
         gains, fully, errors = (np.array(each) for each in zip(*found, strict=True))
         by_chance = _by_chance(fitted, screen, seed, gains.size)
-        by_chance *= float(np.median(fully / np.maximum(gains, 1e-300)))  # a refit adds as much to these
+        some = gains > 0.0
+        if np.any(some):  # a full fit adds as much to these
+            by_chance *= float(np.median(fully[some] / gains[some]))
         null = Null(_mixed(fitted, fully, errors.sum(axis=1), by_chance), errors)
         if null.plain(gain, fitted.errors):
             break

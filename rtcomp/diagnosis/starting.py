@@ -100,6 +100,6 @@ def _sizes_of(term: Term) -> list[Term]:
             if p.name in kind.linear and p.name in entry:
                 neutral = ent.neutral(kind, p.name)
                 value = neutral + times * (float(entry[p.name]) - neutral)
-                entry[p.name] = min(max(value, 0.9 * p.lowest), 0.9 * p.high)
+                entry[p.name] = min(max(value, 0.9 * p.lowest), 0.9 * ent.highest(entry, p))
         found.append(term.with_entry(entry))
     return found

@@ -1,0 +1,48 @@
+"""Filters and spectra of the diagnosis: closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtcomp.diagnosis.spectrum import filtered, spectrum
+from rtcomp.kernels import Floats
+
+
+def one(frequency: Floats) -> Floats:
+    return np.ones_like(frequency)
+
+
+@given(st.floats(0.5, 20.0), st.floats(-3.0, 3.0), st.floats(-50.0, 50.0))
+@settings(max_examples=25, deadline=None)
+def test_a_derivative_is_that_of_the_closed_form(frequency: float, level: float, slope: float) -> None:
+    t = np.arange(4000) / 1000.0
+    omega = 2.0 * math.pi * frequency
+    made = filtered(level + slope * t + np.sin(omega * t), 1000.0, one, derivative=True)
+    inside = slice(600, -600)
+    assert np.allclose(made[inside], (slope + omega * np.cos(omega * t))[inside], atol=0.02 * omega)
+
+
+def test_a_spectrum_has_the_power_of_the_signal() -> None:
+    random = np.random.default_rng(3)
+    noise = 0.3 * random.standard_normal(60_000)
+    frequency, density = spectrum([noise], 500.0)
+    assert np.median(density[frequency > 10.0]) == pytest.approx(0.09 / 250.0, rel=0.05)
+
+
+def test_noise_at_an_end_is_no_step() -> None:
+    """A filter that is strong at low frequencies must not draw the last point out over the recording."""
+    random = np.random.default_rng(5)
+    noise = random.standard_normal(8000)
+    noise[-1] = 30.0
+
+    def low(frequency: Floats) -> Floats:
+        return 1.0 / (1.0 + (frequency / 2.0) ** 2)
+
+    quiet = filtered(noise, 1000.0, low, noisy=True)[-500:-100]
+    loud = filtered(noise, 1000.0, low)[-500:-100]
+    assert np.abs(quiet).max() < 0.2 * np.abs(loud).max()
