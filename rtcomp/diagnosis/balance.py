@@ -26,7 +26,7 @@ from rtcomp.diagnosis.signals import BASE, Signals, key_of
 from rtcomp.diagnosis.spectrum import filtered, spectrum
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
-from rtcomp.physics import Place
+from rtcomp.physics import Effect, Place
 from rtcomp.stage.balance import around_rows, forces, parts_of_drive
 from rtcomp.stage.stage import Stage
 
@@ -165,9 +165,14 @@ class ForceBalance(Signals):
         scale = self._scale(y, by_load)
         return System(scale * y, scale * columns if scale != 1.0 else columns, tuple(spans))
 
-    def error(self, entries: Sequence[Entry], c: Floats, weights: Floats | None = None) -> Floats:
-        """Return ``y - A c`` (n,) of `system` for given coefficients, filtered as one signal: far cheaper."""
-        drive, base, added, by_load = self._groups(entries, weights)
+    def error(
+        self, entries: Sequence[Entry], c: Floats, weights: Floats | None = None, stiffer: float = 1.0
+    ) -> Floats:
+        """Return ``y - A c`` (n,) of `system` for given coefficients, filtered as one signal: far cheaper.
+
+        With the whole of friction so many times `stiffer` than its `weights` make it, for what asks for that.
+        """
+        drive, base, added, by_load = self._groups(entries, weights, stiffer)
         y = self._whitened(drive)[0]
         out = y.copy()
         pending: list[Floats] | None = None
@@ -214,25 +219,32 @@ class ForceBalance(Signals):
         return float(np.sqrt(max(whole / left, 1.0)))
 
     def _groups(
-        self, entries: Sequence[Entry], weights: Floats | None
+        self, entries: Sequence[Entry], weights: Floats | None, stiffer: float = 1.0
     ) -> tuple[Group, list[Group], list[list[Group]], Group | None]:
         """Return the drive side, the columns of base and of each entry, the friction that loads make."""
-        everything = [*self.believed, *entries]
-        adding = [ent.adds_force(ent.kind_of(e)) for e in everything]
-        work = [*self._fixed, *(ent.build(e) for e, adds in zip(everything, adding, strict=True) if not adds)]
+        everything, adding, work = self.at_work(entries)
         drive = [e for e in work if e.place is Place.DRIVE]
         sensors = [e for e in work if e.place is Place.SENSOR]
         modifiers = [e for e in work if e.place is Place.FRICTION]
-        modifiers += [companion for e in modifiers for companion in e.companions()]
         bodies = [e for e in work if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
         forces_added = [ent.build(e) for e, adds in zip(everything, adding, strict=True) if adds]
         side = Group(("y", key_of(drive), key_of(sensors)), lambda: self._drive_side(drive, sensors))
-        base, by_load = self._base(drive, sensors, modifiers, bodies, forces_added, weights)
+        base, by_load = self._base(drive, sensors, modifiers, bodies, forces_added, weights, stiffer)
         added = [
             [self._added(made, sensors) for made in ent.basis(e)] if adds else []
             for e, adds in zip(everything, adding, strict=True)
         ]
         return side, base, added, by_load
+
+    def at_work(self, entries: Sequence[Entry]) -> tuple[list[Entry], list[bool], list[Effect]]:
+        """Return all entries, which of them add a force, and the effects that are at work beside columns."""
+        everything = [*self.believed, *entries]
+        adding = [ent.adds_force(ent.kind_of(e)) for e in everything]
+        work = [*self._fixed, *(ent.build(e) for e, adds in zip(everything, adding, strict=True) if not adds)]
+        changing = [
+            e for e in work if e.place is Place.FRICTION
+        ]  # what others bring is made with the columns
+        return everything, adding, [*work, *(brought for e in changing for brought in e.companions())]
 
     def _plain_drive(self) -> Floats:
         fixed = [e for e in self._fixed if e.place is Place.DRIVE]

@@ -52,13 +52,17 @@ def units_along(
     grain: float,
     start: Floats | None = None,
     least_parts: int = 1,
+    sizes: Floats | None = None,
+    stiffer: float = 1.0,
 ) -> Floats:
     """Return the force (N) of each unit around the rows of a motion, (K, 3 + reaches).
 
+    With `sizes` of the stop elements, (reaches,), their sum times these instead of them: (K, 4).
+
     `motion` is (K, 5): time (s), position (m), velocity, acceleration, the command held up to each row (V);
-    `weights` (N/m) of the stop elements make the friction at hand; `start` (m) are their deflections before
-    the motion, nothing where it is not given. `drive` effects only tell the load. A row is cut into
-    `least_parts`, or more where an effect needs it.
+    `weights` (N/m) of the stop elements make the friction at hand, the whole of it so many times `stiffer`;
+    `start` (m) are their deflections before the motion, nothing where it is not given. `drive` effects only
+    tell the load. A row is cut into `least_parts`, or more where an effect needs it.
     """
     below = stage.mechanics.micro_damping_speed
     units: list[Effect] = [
@@ -78,16 +82,18 @@ def units_along(
     row = float((motion[-1, 0] - motion[0, 0]) / max(motion.shape[0] - 1, 1))
     needed = parts_of([*before, *after], row)
     parts = max(needed, least_parts)
-    out = np.empty((motion.shape[0], SPEED_UNITS + len(reaches)))
+    times = weights if sizes is None else sizes
+    out = np.empty((motion.shape[0], SPEED_UNITS + (len(reaches) if sizes is None else 1)))
     mean = np.zeros_like(out) if parts > 1 else out[:1]
     w = np.zeros(COUNT)
     w[GRAIN] = grain
     base = np.array([stage.mass, stage.force_constant])
     deflection = np.zeros(len(reaches)) if start is None else start.copy()
     smooth = parts > needed == 1  # damping is, between rows
+    whole = bool(bent or after) or any(e.whole_friction for e in before)
     _along(
-        program.steps, program.p, program.s, w, base, motion, parts, smooth, len(before), len(bent), weights,
-        reaches, deflection, out, mean,
+        program.steps, program.p, program.s, w, base, motion, parts, smooth, whole, len(before), len(bent),
+        stiffer, weights, reaches, deflection, sizes is not None, times, out, mean,
     )  # fmt: skip
     for table in (out,) if smooth else (out, mean):
         table[:, 2] = (table[:, 2] - table[:, 1]) / np.log1p(FASTER)
@@ -117,17 +123,24 @@ def _along(
     motion: Floats,
     parts: int,
     smooth: bool,
+    whole: bool,
     first: int,
     bent: int,
+    stiffer: float,
     weights: Floats,
     reaches: Floats,
     deflection: Floats,
+    summed: bool,
+    times: Floats,
     out: Floats,
     mean: Floats,
 ) -> None:
     """Fill `out` with forces at the rows: units of speed are the effects from `first` on.
 
-    Where these are `smooth` between rows, they are only at the ends of rows.
+    After them comes what each element holds, or `summed` up, `times` so many each.
+
+    Where these are `smooth` between rows, they are only at the ends of rows. Where nothing changes or asks
+    for the `whole` of friction, it is not summed up.
 
     Where rows are cut into `parts`, also their `mean` around each row: over the row before it weighed by what
     has passed of that, and over the row after it by what is to come. After those units come `bent` effects
@@ -136,12 +149,11 @@ def _along(
     """
     count = weights.size
     then = first + SPEED_UNITS
-    alone = first == 0 and then == steps[0]  # nothing that changes friction, or asks for the whole of it
     level = stiffness = 0.0
     for i in range(count):
         level += weights[i] * reaches[i]
-        stiffness += weights[i]
-    last = np.zeros(out.shape[1])
+        stiffness += stiffer * weights[i]
+    last, held = np.zeros(out.shape[1]), np.empty(count)
     for k in range(motion.shape[0]):
         for j in range(1, parts + 1):
             along_row(w, motion, k, float(j), parts)
@@ -153,10 +165,15 @@ def _along(
                     w[FRICTION] = 0.0
                     run_chain(steps, p, s, w, first + i, first + i + 1)
                     out[k, i] = w[FRICTION]
-            held = out[k, SPEED_UNITS:]
             _stretch(w[MOVED], w[REACH], w[SCALE], w[SOFTENS], reaches, deflection, held)
-            if not alone:
+            if whole:
                 _whole(steps, p, s, w, then, bent, level, stiffness, weights, reaches, held)
+            if summed:
+                out[k, SPEED_UNITS] = 0.0
+                for i in range(count):
+                    out[k, SPEED_UNITS] += times[i] * held[i]
+            else:
+                out[k, SPEED_UNITS:] = held
             if parts > 1:
                 _share_out(mean, out, last, k, j, parts)
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.at_hand import by_weights, consistent, goes_by_whole, system_around
 from rtcomp.diagnosis.balance import BASE, ForceBalance, System
 from rtcomp.diagnosis.believed import prior_of
 from rtcomp.diagnosis.cache import KEPT_ONCE, Cache
@@ -37,8 +38,8 @@ STEPS = 10
 """Gauss-Newton steps at most."""
 SETTLED = 1e-4
 """Relative gain of a step below which the fit ends."""
-CONSISTENT, TURNS = 0.02, 6
-"""Part of its level by which friction may be away from that which its columns were made for; turns to it."""
+TURNS = 6
+"""Turns at most in which friction is refitted that what goes by it was made for."""
 
 
 class Fitter:
@@ -197,20 +198,25 @@ class Fitter:
         return other
 
     def solve(
-        self, terms: Sequence[Term], weights: Floats, variance: float
+        self, terms: Sequence[Term], weights: Floats, variance: float, around: Floats | None = None
     ) -> tuple[System, Prior, Grams, Floats, float]:
         """Return the system of `terms`, its prior, statistics, coefficients and squared error in sample."""
-        b = self.balance
-        system = b.system([t.entry for t in terms], weights)
-        prior = prior_of(b, [*self._believed, *terms], system, offset=self.offset)
-        grams = Grams.of(system.columns, system.y, b.block, b.blocks)
+        system, prior, grams = self._made(terms, weights, around)
         c = grams.solve(self.use, prior, variance)
         return system, prior, grams, c, float(grams.errors(c, self.use).sum())
+
+    def _made(
+        self, terms: Sequence[Term], weights: Floats, around: Floats | None
+    ) -> tuple[System, Prior, Grams]:
+        b = self.balance
+        system = system_around(b, [t.entry for t in terms], weights, around)
+        prior = prior_of(b, [*self._believed, *terms], system, offset=self.offset)
+        return system, prior, Grams.of(system.columns, system.y, b.block, b.blocks)
 
     def quick(self, terms: Sequence[Term]) -> float:
         """Return the squared error in sample of `terms` as they are, with believed friction at work."""
         weights = self.balance.weights
-        for _ in range(2):
+        for _ in range(2 if by_weights(self.balance, [t.entry for t in terms]) else 1):
             _, _, _, c, sse = self.solve(terms, weights, 1.0)
             weights = c[self.balance.friction]
         return sse
@@ -224,14 +230,18 @@ class Fitter:
             weights = start.weights
         rows = np.isin(b.block, np.flatnonzero(self.use))
         variance = 1.0 if start is None else start.variance
-        for _ in range(2):
-            made_for = weights
-            system, prior, _, c, sse = self.solve(current, made_for, variance)
-            variance = sse / max(int(rows.sum()), 1)
-            weights = c[b.friction]
+        entries, made_for = [t.entry for t in current], weights
+        system, prior, grams, c, sse = self.solve(current, made_for, variance)
+        variance = sse / max(int(rows.sum()), 1)
+        if by_weights(b, entries):
+            made_for = c[b.friction]
+            system, prior, grams = self._made(current, made_for, c)
+        c = grams.solve(self.use, prior, variance)
+        sse = float(grams.errors(c, self.use).sum())
+        variance = sse / max(int(rows.sum()), 1)
+        weights = c[b.friction]
         free = free_of(current, b)
         damping = 1e-3
-        tangents = np.zeros((0, system.y.size))
         for _ in range(steps if free else 0):
             tangents = self._tangents(current, free, system, c, weights)
             wide = prior.extended(np.full(len(free), -np.inf), np.full(len(free), np.inf))
@@ -245,7 +255,7 @@ class Fitter:
                 for f, step in zip(free, moved.tolist(), strict=True):
                     f.put(trial, f.get(current) + min(max(step, -f.most(current)), f.most(current)))
                 try:
-                    found = self.solve(trial, weights, variance)
+                    found = self.solve(trial, weights, variance, c)
                 except ConfigError:
                     damping *= 10.0
                     continue
@@ -264,20 +274,14 @@ class Fitter:
             free = free_of(current, b)
             if gained < SETTLED:
                 break
-        by_level = any(ent.kind_of(t.entry).whole_friction for t in current)
-        for _ in range(TURNS if by_level else 0):
-            if self._consistent(made_for, weights):
-                break
-            made_for = weights
-            system, prior, _, c, sse = self.solve(current, made_for, variance)
+        turns = TURNS if goes_by_whole(b, entries) else 0
+        while turns > 0 and not consistent(b, made_for, weights):
+            made_for, turns = weights, turns - 1
+            system, prior, _, c, sse = self.solve(current, made_for, variance, c)
             weights = c[b.friction]
         done = self._finished(current, free, system, prior, c, sse, variance, weights)
-        return self._as_it_is(done) if by_level and not self._consistent(made_for, weights) else done
-
-    def _consistent(self, made_for: Floats, weights: Floats) -> bool:
-        """Tell whether friction is that which its columns were made for, within a part of its level."""
-        off, level = (float(w @ self.balance.reaches) for w in (np.abs(weights - made_for), weights))
-        return off <= CONSISTENT * max(level, 1e-300)
+        settled = not goes_by_whole(b, entries) or consistent(b, made_for, weights)
+        return done if settled else self._as_it_is(done)
 
     def _as_it_is(self, model: Fitted) -> Fitted:
         """Return a model with the error of its own friction, where its columns were made for another.

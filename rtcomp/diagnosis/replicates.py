@@ -16,13 +16,13 @@ from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.replicate import replicate
 from rtcomp.diagnosis.screening import Screen, Screened
-from rtcomp.diagnosis.settings import REPLICATES
+from rtcomp.diagnosis.settings import LEVEL, REPLICATES
 from rtcomp.diagnosis.significance import Null, log_gain
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
-FEW = 6
-"""Replicates after which what is plain is settled."""
+FEW, MORE = 6, 4
+"""Replicates after which what is plain is settled; so many more at a time where it is not."""
 
 
 def free_columns(fitted: Fitted) -> Floats:
@@ -39,9 +39,9 @@ def null_of(
     """Return the null distribution beside a fitted model.
 
     Replicates are drawn until it is plain whether `gain` and the error of the fit are beyond them: sequential
-    Monte Carlo (Besag and Clifford 1991, Biometrika 78(2)). A model that cannot be kept on the recorded
-    motion is judged by surrogates of its residual instead. After the time `ends` (time.monotonic) gains are
-    those of first order.
+    Monte Carlo (Besag and Clifford 1991, Biometrika 78(2)). The first few tell what a full fit adds to a gain
+    of first order. A model that cannot be kept on the recorded motion is judged by surrogates of its residual
+    instead. After the time `ends` (time.monotonic) gains are those of first order.
     """
     balance = fitter.balance
     try:
@@ -67,22 +67,27 @@ def null_of(
             look = Screen(made, other.block, other.blocks, other.use)
             gains += zip(made, look.gains(free_columns(again), again.residual), strict=True)
         scale = fitter.power / max(other.power, 1e-300)
-        gain, fully = largest(other, again, gains, ends)
+        gain, fully = largest(other, again, gains, ends if number < FEW else -math.inf)
         return gain, fully, again.errors * scale
 
     found: list[tuple[float, float, Floats]] = []
-    for first, last in ((0, FEW), (FEW, REPLICATES)):
+    chance = np.zeros(0)
+    first, last = 0, FEW
+    while first < last:
         found += [f for f in shared(one, range(first, last)) if f is not None]
         if len(found) < FEW // 2:
             return _surrogates(fitter, fitted, screen, seed)
         gains, fully, errors = (np.array(each) for each in zip(*found, strict=True))
-        by_chance = _by_chance(fitted, screen, seed, gains.size)
-        some = gains > 0.0
-        if np.any(some):  # a full fit adds as much to these
-            by_chance *= float(np.median(fully[some] / gains[some]))
-        null = Null(_mixed(fitted, fully, errors.sum(axis=1), by_chance), errors)
-        if null.plain(gain, fitted.errors):
+        chance = np.append(chance, _by_chance(fitted, screen, 1000 * seed + first, gains.size - chance.size))
+        if first == 0:  # what a full fit adds to a gain, it adds to those that are not fitted in full as well
+            some = gains > 0.0
+            more = float(np.median(fully[some] / gains[some])) if np.any(some) else 1.0
+            few = gains.size
+        fully[few:] *= more
+        null = Null(_mixed(fitted, fully, errors.sum(axis=1), more * chance), errors)
+        if null.plain(gain, fitted.errors, LEVEL):
             break
+        first, last = last, min(last + MORE, REPLICATES)
     return null
 
 

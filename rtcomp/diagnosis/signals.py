@@ -167,6 +167,7 @@ class Signals:
         bodies: Sequence[Effect],
         adding: Sequence[Effect],
         weights: Floats | None,
+        stiffer: float,
     ) -> tuple[list[Group], Group | None]:
         """Return the base's columns (mass; units of damping and friction; a constant force), the load's.
 
@@ -175,14 +176,15 @@ class Signals:
         whole = any(e.whole_friction for e in modifiers)
         play = next((e for e in bodies if e.behind and _active(e)), None)
         hung = [e for e in bodies if not e.behind]
-        own = weights.tobytes() if weights is not None and (whole or play is not None) else b""
+        asked = weights is not None and (whole or play is not None)
+        own = (weights.tobytes(), stiffer) if weights is not None and asked else ()
         before: list[Effect] = []
         if any(e.values.get("external") is not None for e in modifiers):
             chain = [e for e in self.stage.chain if e.place is Place.DRIVE]
             before = [*chain, *[e for e in drive if e not in chain]]
             if any(e.values.get("external") for e in modifiers):
                 before += [e for e in adding if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
-        behind = ("load", key_of([play] if play else []), own if play is not None else b"")
+        behind = ("load", key_of([play] if play else []), own if play is not None else ())
 
         def mass() -> list[Floats]:
             found = []
@@ -199,7 +201,9 @@ class Signals:
                 found.append(a)
             return found
 
-        def units(more: float = 0.0, some: np.ndarray | None = None) -> list[Floats]:
+        def units(
+            more: float = 0.0, some: np.ndarray | None = None, times: Floats | None = None
+        ) -> list[Floats]:
             found = []
             for k, (s, p) in enumerate(zip(self.data.segments, self.paths(sensors), strict=True)):
                 path = p
@@ -209,15 +213,15 @@ class Signals:
                     path = Path(y, v, _second_difference(y, self.data.rate), p.measured)
                 pushed = replace(s, voltage=(1.0 + more) * s.voltage) if more else s
                 at_hand = weights if whole else None
-                found.append(self._units(pushed, path, before, modifiers, at_hand, some))
+                found.append(self._units(pushed, path, before, modifiers, at_hand, some, times, stiffer))
             return found
 
         def of_sizes(sizes: Floats) -> list[Floats]:
             some = sizes[SPEED_UNITS:] != 0.0
             if whole:
                 some |= held != 0.0
-            these = np.concatenate([sizes[:SPEED_UNITS], sizes[SPEED_UNITS:][some]])
-            return [table @ these for table in units(some=some)]
+            whole_of_it = np.append(sizes[:SPEED_UNITS], 1.0)
+            return [table @ whole_of_it for table in units(some=some, times=sizes[SPEED_UNITS:])]
 
         def by_load() -> list[Floats]:
             pairs = zip(units(MORE), units(), strict=True)
@@ -261,16 +265,22 @@ class Signals:
         modifiers: Sequence[Effect],
         weights: Floats | None,
         some: np.ndarray | None = None,
+        times: Floats | None = None,
+        stiffer: float = 1.0,
     ) -> Floats:
-        """Return the force (N, (K, p)) around the rows of damping and of friction units, all or `some`."""
+        """Return the force (N, (K, p)) around the rows of damping and of friction units, all or `some`.
+
+        With so many `times` each, their sum instead of them.
+        """
         motion = np.column_stack([segment.time, path.x, path.v, path.a, self._given(segment)])
         held, reaches = self.weights if weights is None else weights, self.reaches
         start = self._start(segment)
         if some is not None:
             held, reaches, start = held[some], reaches[some], start[some]
+            times = times[some] if times is not None else None
         return units_along(
             self.stage, list(before), list(modifiers), reaches, held, np.ascontiguousarray(motion),
-            self.grain, start, PARTS,
+            self.grain, start, PARTS, times, stiffer,
         )  # fmt: skip
 
     def _start(self, segment: Segment) -> Floats:

@@ -9,8 +9,10 @@ import numpy as np
 
 from rtcomp.kernels import Floats
 
-PLAIN = (1e-8, 0.3)
-"""P-values of a few replicates, below and above which the level is far away, however few they are."""
+SURE = 3.0
+"""Standard errors of the moments of a sample by which a value must be away from the level to be plain."""
+MEAN, KURTOSIS = 0.5772156649, 5.4
+"""Of Gumbel's law: its mean over its scale, its fourth moment over its variance squared."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,7 @@ class Null:
 
     def threshold(self, level: float) -> float:
         """Return the gain that has this p-value."""
-        spread = float(self.gains.std(ddof=1)) * np.sqrt(6.0) / np.pi
-        return float(self.gains.mean() - 0.5772156649 * spread - spread * np.log(-np.log1p(-level)))
+        return float(self.gains.mean() + self.gains.std(ddof=1) * _at_level(level))
 
     def p_of_error(self, errors: Floats) -> float:
         """Return the probability of squared errors (B,) as large where the model is the whole truth.
@@ -49,20 +50,41 @@ class Null:
         """Tell whether neither the largest gain nor the errors left are more than chance at `level`."""
         return self.p_value(gain) > level and self.p_of_error(errors) > level
 
-    def plain(self, gain: float, errors: Floats) -> bool:
-        """Tell whether more replicates would change no decision on this gain and these errors."""
-        return all(p < PLAIN[0] or p > PLAIN[1] for p in (self.p_value(gain), self.p_of_error(errors)))
+    def plain(self, gain: float, errors: Floats, level: float) -> bool:
+        """Tell whether more replicates would change no decision at `level` on this gain and these errors."""
+        return _plain(self.gains, gain, level) and _plain(_level(self.errors), float(_level(errors)), level)
 
 
 def _level(errors: Floats) -> Floats:
     return np.asarray(np.log(np.maximum(errors, 1e-300)).mean(axis=-1))
 
 
+def _scaled(sample: Floats, value: float) -> float:
+    """Return a value less the mean of a sample, over its standard deviation."""
+    mean = float(sample.mean())
+    return (value - mean) / max(float(sample.std(ddof=1)), 1e-9 * abs(mean) + 1e-12)
+
+
 def _gumbel_tail(sample: Floats, value: float) -> float:
-    spread = max(float(sample.std(ddof=1)), 1e-9 * abs(float(sample.mean())) + 1e-12)
-    scale = spread * np.sqrt(6.0) / np.pi
-    at = float(sample.mean()) - 0.5772156649 * scale
-    return float(-np.expm1(-np.exp(-np.clip((value - at) / scale, -30.0, 700.0))))
+    at = _scaled(sample, value) * np.pi / np.sqrt(6.0) + MEAN
+    return float(-np.expm1(-np.exp(-np.clip(at, -30.0, 700.0))))
+
+
+def _at_level(level: float) -> float:
+    """Return how many standard deviations above its mean a Gumbel law's tail is `level`."""
+    return float((-np.log(-np.log1p(-level)) - MEAN) * np.sqrt(6.0) / np.pi)
+
+
+def _plain(sample: Floats, value: float, level: float) -> bool:
+    """Tell whether a value is so far from the `level` that errors of the sample's moments do not matter.
+
+    Those of its mean and of the logarithm of its deviation are taken from large samples.
+    """
+    z, limit = _scaled(sample, value), _at_level(level)
+    shift = SURE / np.sqrt(sample.size)
+    spread = shift * np.sqrt(0.25 * (KURTOSIS - 1.0))
+    below = z + np.hypot(shift, max(z, 0.0) * spread) < limit
+    return bool(below or z * np.exp(-spread) - shift > limit)
 
 
 def log_gain(before: Floats, after: Floats) -> float:

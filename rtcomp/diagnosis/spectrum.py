@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 import scipy.fft
 
-from rtcomp.kernels import Floats
+from rtcomp.kernels import Floats, compiled
 
 PAD = 0.1
 """Part of a signal that is mirrored beyond each of its ends before it is filtered."""
 BANDS = 60
 """Bands, equally wide in the logarithm of frequency, over which spectra are smoothed."""
-AT_A_TIME = 2
+AT_A_TIME = 4
 """Signals that are transformed together: more do not stay in the processor's cache."""
 ALL = slice(None)
 
@@ -41,68 +40,86 @@ def filtered(
     are returned, which is less work where they are few.
     """
     table = np.atleast_2d(rows)
-    first, stop, every = wanted.indices(table.shape[1])
-    pad = max(2, min(int(PAD * table.shape[1]), table.shape[1] - 1))
-    line = _Line(pad, noisy, np.arange(pad + first, pad + stop, every))
-    few = -(-(table.shape[1] + 2 * pad) // every)
+    size = table.shape[1]
+    first, stop, every = wanted.indices(size)
+    pad = max(2, min(int(PAD * size), size - 1))
+    at = np.arange(pad + first, pad + stop, every)
+    """Rows that are wanted, counted from the beginning of what is mirrored."""
+    few = -(-(size + 2 * pad) // every)
     few = scipy.fft.next_fast_len(few + few % 2, real=True)
     few += few % 2
     gain = _gain(response, few * every, rate, derivative, pad + first)
     at_rest = float(_gain(response, few * every, rate, False, 0)[0].real)
-    out = np.empty((table.shape[0], line.at.size))
+    out = np.empty((table.shape[0], at.size))
     for some in range(0, table.shape[0], AT_A_TIME):
-        part = slice(some, some + AT_A_TIME)
-        long, level, slope = line.without(table[part], few * every)
+        part = table[some : some + AT_A_TIME]
+        long, lines = np.zeros((part.shape[0], few * every)), np.empty((part.shape[0], 2))
+        _lay_out(part, pad, noisy, long, lines)
         transformed = scipy.fft.rfft(long, axis=1, overwrite_x=True)
-        transformed *= gain
-        folded = _folded(transformed, every)
-        out[part] = scipy.fft.irfft(folded, n=few, axis=1, overwrite_x=True)[:, : line.at.size]
-        out[part] += at_rest * (slope * rate if derivative else level + slope * line.at)
+        folded = np.zeros((part.shape[0], few // 2 + 1), np.complex128)
+        _fold(transformed, gain, every, folded)
+        found = scipy.fft.irfft(folded, n=few, axis=1, overwrite_x=True)
+        _put_back(found, lines, at_rest, rate, derivative, at, out[some : some + AT_A_TIME])
     return out if rows.ndim > 1 else out[0]
 
 
-@dataclass(frozen=True)
-class _Line:
-    """A straight line has no place in a Fourier series; it is taken away and filtered by itself."""
+@compiled
+def _lay_out(table: Floats, pad: int, noisy: bool, long: Floats, lines: Floats) -> None:
+    """Put signals (p, K) into `long` (p, N), mirrored over `pad` rows and without a straight line.
 
-    pad: int
-    noisy: bool
-    at: np.ndarray
-    """Rows that are wanted, counted from the beginning of what is mirrored."""
+    A straight line has no place in a Fourier series; its level and slope a row go to `lines`, (p, 2), and it
+    is filtered by itself.
+    """
+    size = table.shape[1]
+    total = size + 2 * pad
+    ends = max(1, pad // 2) if noisy else 1
+    for i in range(table.shape[0]):
+        x, y = table[i], long[i]
+        for k in range(size):
+            y[pad + k] = x[k]
+        for k in range(pad):
+            y[k], y[pad + size + k] = x[pad - k], x[size - 2 - k]
+        if not noisy:
+            for k in range(pad):
+                y[k], y[pad + size + k] = 2.0 * x[0] - y[k], 2.0 * x[size - 1] - y[pad + size + k]
+        level, slope = y[:ends].mean(), y[total - ends : total].mean()
+        slope = (slope - level) / (total - 1)
+        for k in range(total):
+            y[k] -= level + slope * k
+        lines[i, 0], lines[i, 1] = level, slope
 
-    def without(self, table: Floats, count: int) -> tuple[Floats, Floats, Floats]:
-        """Return signals (p, count), mirrored and without their line, and its level and slope, (p, 1)."""
-        pad, size = self.pad, table.shape[1]
-        total = size + 2 * pad
-        long = np.zeros((table.shape[0], count))
-        long[:, :pad], long[:, pad : pad + size] = table[:, pad:0:-1], table
-        long[:, pad + size : total] = table[:, -2 : -pad - 2 : -1]
-        if not self.noisy:
-            long[:, :pad] = 2.0 * table[:, :1] - long[:, :pad]
-            long[:, pad + size : total] = 2.0 * table[:, -1:] - long[:, pad + size : total]
-        ends = max(1, pad // 2) if self.noisy else 1
-        level, last = long[:, :ends].mean(axis=1), long[:, total - ends : total].mean(axis=1)
-        slope = ((last - level) / (total - 1))[:, None]
-        long[:, :total] -= level[:, None] + slope * np.arange(total)
-        return long, level[:, None], slope
 
-
-def _folded(transformed: Complexes, every: int) -> Complexes:
-    """Return the transform (p, M / 2 + 1) of every so manieth row of real ones, from theirs, (p, N / 2 + 1).
+@compiled
+def _fold(transformed: Complexes, gain: Complexes, every: int, folded: Complexes) -> None:
+    """Put the transforms (p, M / 2 + 1) of every so manieth row into `folded`: those of all, times `gain`.
 
     Taking some of the rows lays the parts of the spectrum, M long each, one over the other.
     """
-    if every == 1:
-        return transformed
-    half = (transformed.shape[1] - 1) // every
-    folded = transformed[:, : half + 1].copy()
-    for m in range(1, every):
-        if 2 * m < every:
-            folded += transformed[:, 2 * m * half : (2 * m + 1) * half + 1]
-        else:  # beyond the middle: the mirror image
-            last = 2 * (every - m) * half
-            folded += transformed[:, last - half : last + 1][:, ::-1].conj()
-    return np.asarray(folded / every)
+    half = folded.shape[1] - 1
+    for i in range(transformed.shape[0]):
+        x, y = transformed[i], folded[i]
+        for m in range(every):
+            if 2 * m < every:
+                at = 2 * m * half
+                for k in range(half + 1):
+                    y[k] += gain[at + k] * x[at + k]
+            else:  # beyond the middle: the mirror image
+                at = 2 * (every - m) * half
+                for k in range(half + 1):
+                    y[k] += (gain[at - k] * x[at - k]).conjugate()
+        for k in range(half + 1):
+            y[k] /= every
+
+
+@compiled
+def _put_back(
+    found: Floats, lines: Floats, at_rest: float, rate: float, derivative: bool, at: np.ndarray, out: Floats
+) -> None:
+    """Put what was `found` and its line, as it passes at a response of `at_rest`, into `out`."""
+    for i in range(out.shape[0]):
+        level, slope = at_rest * lines[i, 0], at_rest * lines[i, 1]
+        for k in range(out.shape[1]):
+            out[i, k] = found[i, k] + (slope * rate if derivative else level + slope * at[k])
 
 
 @lru_cache(maxsize=64)

@@ -1,0 +1,50 @@
+"""Effects that go by the whole of friction: columns made for a friction at hand, which the fit moves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rtcomp.diagnosis.balance import ForceBalance, System
+from rtcomp.diagnosis.entries import Entry
+from rtcomp.kernels import Floats
+
+STIFFER = 1.01
+"""Times its stiffness by which the whole of friction is made stiffer, to see what asks for that."""
+CONSISTENT = 0.02
+"""Part of its level by which friction may be away from that which its columns were made for."""
+
+
+def goes_by_whole(balance: ForceBalance, entries: Sequence[Entry]) -> bool:
+    """Tell whether one of `entries`, or of the belief, asks for the whole of the friction at hand."""
+    return any(e.whole_friction for e in balance.at_work(entries)[2])
+
+
+def by_weights(balance: ForceBalance, entries: Sequence[Entry]) -> bool:
+    """Tell whether columns with `entries` at work depend on the friction at hand."""
+    return any(e.whole_friction or e.behind for e in balance.at_work(entries)[2])
+
+
+def system_around(
+    balance: ForceBalance, entries: Sequence[Entry], weights: Floats, around: Floats | None
+) -> System:
+    """Return the system made for friction of `weights` (N/m), to first order around coefficients (p,).
+
+    The stiffness of the whole is the sum of the units'. So what asks for it changes with each unit's alike,
+    and a fine one, which hardly holds a force, would be free to move it: this is part of their columns.
+    """
+    system, stiffness = balance.system(entries, weights), float(weights.sum())
+    if around is None or stiffness <= 0.0 or not goes_by_whole(balance, entries):
+        return system
+    change = balance.error(entries, around, weights) - balance.error(entries, around, weights, STIFFER)
+    change /= (STIFFER - 1.0) * stiffness
+    columns = system.columns.copy()
+    columns[balance.friction] += change
+    return System(system.y + stiffness * change, columns, system.of_entry)
+
+
+def consistent(balance: ForceBalance, made_for: Floats, weights: Floats) -> bool:
+    """Tell whether friction (N/m) is that which its columns were made for, within a part of its level."""
+    off, level = (float(w @ balance.reaches) for w in (np.abs(weights - made_for), weights))
+    return off <= CONSISTENT * max(level, 1e-300)
