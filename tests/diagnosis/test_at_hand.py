@@ -26,7 +26,7 @@ def fitter() -> Fitter:
 
 @pytest.mark.parametrize("start", [0.2, 0.6, 1.5])
 def test_a_strong_creep_is_fitted_from_anywhere(fitter: Fitter, start: float) -> None:
-    """What creep goes by is the friction that is fitted with it: the ratio of both is what a recording shows."""
+    """Creep goes by the friction that is fitted with it: a recording shows the ratio of both."""
     found = fitter.fit([Term.of({**CREEP, "fraction": start, "time_constant": 0.4})])
     creep = found.entries[0]
     stiffness = sum(e["stiffness"] for e in stage().to_dict()["stage"]["friction"])
