@@ -6,8 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import ForceBalance, System
 from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.free import Term
 from rtcomp.kernels import Floats
 
 STIFFER = 1.01
@@ -48,3 +50,10 @@ def consistent(balance: ForceBalance, made_for: Floats, weights: Floats) -> bool
     """Tell whether friction (N/m) is that which its columns were made for, within a part of its level."""
     off, level = (float(w @ balance.reaches) for w in (np.abs(weights - made_for), weights))
     return off <= CONSISTENT * max(level, 1e-300)
+
+
+def newly_behind(terms: Sequence[Term], before: Sequence[Term]) -> bool:
+    """Tell whether friction comes to be behind a play, which a fit without one takes for longer reaches."""
+    return any(ent.kind_of(t.entry).behind for t in terms) and not any(
+        ent.kind_of(t.entry).behind for t in before
+    )

@@ -18,8 +18,9 @@ from rtcomp.stage.sensed import true_position
 
 MOST_ROWS = 36_000
 """Rows of the recording that are used as they are; of longer ones windows are taken, evenly spread."""
-ENOUGH, OVERSAMPLED = 16_000, 4.0
-"""Rows beyond which they are averaged, to a rate over the motion's bandwidth of no less than that."""
+OVERSAMPLED = 8.0
+"""Least rate of averaged rows over the motion's bandwidth. At 4 what averages make of a reversal, in which
+friction and speed change within a few rows, was up to ten times the sensor's noise; at 8 it is below that."""
 BEFORE = 10_000
 """Rows, at most, of the way to a window."""
 RUN_IN = 0.2
@@ -96,11 +97,11 @@ class Data:
 def load_data(recordings: Sequence[Recording], *, held: bool = True, bandwidth: float = 0.0) -> Data:
     """Return the recordings (of one rate) as segments: without long gaps, windows of very long ones.
 
-    Where the `bandwidth` (Hz) of the motion is known, many rows far beyond it are averaged.
+    Where the `bandwidth` (Hz) of the motion is known, too many rows far beyond it are averaged.
     """
     rate = recordings[0].rate_hz
     found = [s for r in recordings for s in _segments(r)]
-    many = -(-sum(s.time.size for s in found) // ENOUGH)
+    many = -(-sum(s.time.size for s in found) // MOST_ROWS)
     factor = max(1, min(many, int(rate / (OVERSAMPLED * bandwidth)))) if bandwidth else 1
     if factor > 1:
         found, rate = [averaged(s, factor) for s in found], rate / factor

@@ -7,13 +7,14 @@ problem linearised there, with all parameters refitted.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.at_hand import by_weights, consistent, goes_by_whole, system_around
+from rtcomp.diagnosis.at_hand import by_weights, consistent, goes_by_whole, newly_behind, system_around
 from rtcomp.diagnosis.balance import BASE, ForceBalance, System
 from rtcomp.diagnosis.believed import prior_of
 from rtcomp.diagnosis.cache import KEPT_ONCE, Cache
@@ -85,10 +86,7 @@ class Fitter:
         return ent.adds_force(kind)
 
     def rough(self, model: Fitted, families: Sequence[Sequence[Term]], count: int, ends: float) -> list[Term]:
-        """Return terms of `count` families that are worth a full fit beside a model.
-
-        The likeliest come first in `families` and in each.
-        """
+        """Return terms of `count` families worth a full fit; the likeliest come first there and in each."""
         return [terms[0] for terms in families[:count]]
 
     def units(self, entries: Sequence[Entry]) -> Floats:
@@ -129,21 +127,25 @@ class Fitter:
         return found
 
     def overtones(self, model: Fitted, at: int) -> Floats:
-        """Return the columns (q, n) of what another form of its effect number `at`, if a wave, would do."""
+        """Return the columns (q, n) that another form of its effect number `at`, if a wave, would add."""
         return overtones(self, model, model.entries[at])
 
     def relative(self, model: Fitted) -> float:
         """Return what a model leaves over what there is to explain, rms of both, without the reserved."""
-        rows = ~self.balance.reserved[self.balance.block]
-        power = float(np.mean(self.balance.drive_force()[rows] ** 2))
-        return float(np.sqrt(np.mean(self.force(model)[rows] ** 2) / max(power, 1e-300)))
+        return self._over_drive(self.force(model))
+
+    def between(self, one: Fitted, other: Fitted) -> float:
+        """Return by how much two models differ, over the same."""
+        return self._over_drive(self.force(one) - self.force(other))
 
     def relative_of(self, stage: Stage) -> float:
-        """Return the same of any stage as it is."""
+        """Return what any stage leaves as it is, over the same."""
         drive, needed = self.balance.both_sides(stage)
-        rows = ~self.balance.reserved[self.balance.block]
-        power = float(np.mean(drive[rows] ** 2))
-        return float(np.sqrt(np.mean((drive - needed)[rows] ** 2) / max(power, 1e-300)))
+        return self._over_drive(drive - needed, drive)
+
+    def _over_drive(self, force: Floats, drive: Floats | None = None) -> float:
+        given = self.balance.drive_force() if drive is None else drive
+        return math.sqrt(np.mean(force[self.rows] ** 2) / max(np.mean(given[self.rows] ** 2), 1e-300))
 
     def has_offset(self, model: Fitted) -> bool:
         """Tell whether a model has a constant force beside its entries."""
@@ -155,8 +157,7 @@ class Fitter:
         if Noise.stated(b.stage) > 0.0:
             return 1.0
         sizes = [s.time[b.whitening.rows(s)].size for s in b.data.segments]
-        rows = np.split(model.residual, np.cumsum(sizes)[:-1])
-        return b.whitening.louder(rows, b.noise, b.data)
+        return b.whitening.louder(np.split(model.residual, np.cumsum(sizes)[:-1]), b.noise, b.data)
 
     def above_noise(self, model: Fitted, louder: float = 1.0) -> float:
         """Return that relative error (rms) above that of noise, so many times `louder`."""
@@ -226,19 +227,23 @@ class Fitter:
         b = self.balance
         current = list(terms)
         weights = b.weights
-        if start is not None and start.weights.size == b.reaches.size and not _newly_behind(terms, start):
+        if (
+            start is not None
+            and start.weights.size == b.reaches.size
+            and not newly_behind(terms, start.terms)
+        ):
             weights = start.weights
-        rows = np.isin(b.block, np.flatnonzero(self.use))
+        count = max(int(self.rows.sum()), 1)
         variance = 1.0 if start is None else start.variance
         entries, made_for = [t.entry for t in current], weights
         system, prior, grams, c, sse = self.solve(current, made_for, variance)
-        variance = sse / max(int(rows.sum()), 1)
+        variance = sse / count
         if by_weights(b, entries):
             made_for = c[b.friction]
             system, prior, grams = self._made(current, made_for, c)
         c = grams.solve(self.use, prior, variance)
         sse = float(grams.errors(c, self.use).sum())
-        variance = sse / max(int(rows.sum()), 1)
+        variance = sse / count
         weights = c[b.friction]
         free = free_of(current, b)
         damping = 1e-3
@@ -269,7 +274,7 @@ class Fitter:
             current, made_for = trial, weights
             system, prior, _grams, c, sse = found
             weights = c[b.friction]
-            variance = sse / max(int(rows.sum()), 1)
+            variance = sse / count
             damping = max(0.1 * damping, 1e-6)
             free = free_of(current, b)
             if gained < SETTLED:
@@ -341,10 +346,3 @@ class Fitter:
             return np.zeros_like(rest)
 
         return np.array(shared(one, free)) if free else np.zeros((0, system.y.size))
-
-
-def _newly_behind(terms: Sequence[Term], start: Fitted) -> bool:
-    """Tell whether friction comes to be behind a play, which a fit without one takes for longer reaches."""
-    return any(ent.kind_of(t.entry).behind for t in terms) and not any(
-        ent.kind_of(t.entry).behind for t in start.terms
-    )

@@ -152,7 +152,7 @@ def test_between_rows_a_position_is_the_cubic_through_both(terms: list[float], s
 def test_a_replicate_of_averaged_rows_is_read_in_counts() -> None:
     """At rest a reading stays at its count, however many rows are averaged."""
     coarse = stage().with_changes(sensor={"noise": 1e-7, "resolution": 1e-6})
-    moving = there_and_back(20.0)
+    moving = there_and_back(40.0)
     resting = np.where(np.arange(moving.size) % 10_000 < 4000, 0.0, moving)
     data = load_data([run(coarse, resting)], bandwidth=12.0)
     assert data.averaged > 1
