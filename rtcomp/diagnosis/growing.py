@@ -10,15 +10,16 @@ import numpy as np
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.candidates import Candidate, started
 from rtcomp.diagnosis.cores import shared
-from rtcomp.diagnosis.fit import STEPS, Fitter
+from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.screening import Screened
 from rtcomp.diagnosis.settings import FULL_FITS
 from rtcomp.errors import ConfigError
 
-SCANNED, BEGUN = 14, 4
-"""Values of a length that are tried where first order is no guide; steps of a fit that is begun from them."""
+SCANNED, AWAY = 14, 10.0
+"""Values of a number that are tried where first order is no guide; how many times its default they go to."""
 
 
 def grow(
@@ -39,12 +40,12 @@ def grow(
     return [f for f in found if f is not None]
 
 
-def _fitted(fitter: Fitter, model: Fitted, term: Term, ends: float, steps: int = STEPS) -> Fitted | None:
+def _fitted(fitter: Fitter, model: Fitted, term: Term, ends: float) -> Fitted | None:
     """Return the model with a term, fitted; None where that is impossible, or after the time `ends`."""
     if time.monotonic() > ends:
         return None
     try:
-        return fitter.fit([*model.terms, term], model, steps)
+        return fitter.fit([*model.terms, term], model)
     except (ConfigError, np.linalg.LinAlgError):
         return None
 
@@ -53,33 +54,34 @@ def _scanned(fitter: Fitter, model: Fitted, term: Term, ends: float) -> list[Ter
     """Return the term at the length at which a model with it fits best; none where it fits best without.
 
     And with those numbers free too that else have their defaults: how a load meets the ends of its play
-    decides which length fits, so this is begun from several around the best.
+    decides which length fits. They are looked through one after the other, frequencies first, of which many
+    fit almost, then the length again.
     """
-    name = next(p.name for p in ent.free_parameters(term.entry, linear=False) if p.unit == "m")
-    stated = {p.name: p.default for p in ent.kind_of(term.entry).parameters if p.default is not None}
+    length = next(p.name for p in ent.free_parameters(term.entry, linear=False) if p.unit == "m")
+    stated = [p for p in ent.kind_of(term.entry).parameters if p.default is not None]
     low, high = fitter.balance.data.stroke
+    lengths = np.geomspace(2.0 * fitter.balance.grain, 0.25 * (high - low), SCANNED)
 
-    def at(value: float) -> Term:
-        return term.with_entry({**term.entry, name: value})
-
-    def error(value: float) -> float:
+    def error(entry: Entry) -> float:
         if time.monotonic() > ends:
             return np.inf
         try:
-            return fitter.quick([*model.terms, at(value)])
+            return fitter.quick([*model.terms, term.with_entry(entry)])
         except (ConfigError, np.linalg.LinAlgError):
             return np.inf
 
-    def begun(value: float) -> Fitted | None:
-        return _fitted(fitter, model, Term.of({**stated, **at(value).entry}), ends, BEGUN)
+    def best(entry: Entry, name: str, values: Sequence[float]) -> tuple[float, Entry]:
+        tried = [entry, *({**entry, name: value} for value in values)]
+        return min(zip(shared(error, tried), tried, strict=True), key=lambda one: one[0])
 
-    grid = np.geomspace(2.0 * fitter.balance.grain, 0.25 * (high - low), SCANNED)
-    errors = shared(error, grid.tolist())
-    best = int(np.argmin(errors))
-    if errors[best] >= model.sse:
+    left, alone = best(term.entry, length, lengths.tolist())
+    if left >= model.sse:
         return []
-    freed = [f for f in shared(begun, grid[max(best - 2, 0) : best + 2].tolist()) if f is not None]
-    finer = np.geomspace(grid[max(best - 1, 0)], grid[min(best + 1, grid.size - 1)], SCANNED // 2)
-    errors = shared(error, finer.tolist())
-    found = [at(float(finer[int(np.argmin(errors))]))]
-    return [*found, min(freed, key=lambda f: f.sse).terms[-1]] if freed else found
+    entry = {**{p.name: p.default for p in stated}, **alone}
+    for p in sorted(stated, key=lambda p: p.unit != "Hz"):
+        values = float(entry[p.name]) * np.geomspace(1.0 / AWAY, AWAY, SCANNED)
+        entry = best(entry, p.name, values[(values > p.lowest) & (values < ent.highest(entry, p))].tolist())[
+            1
+        ]
+    entry = best(entry, length, (float(entry[length]) * np.geomspace(1.0 / AWAY, 1.0, SCANNED)).tolist())[1]
+    return [term.with_entry(alone), Term.of(entry)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from recorded import STAGE, run, stage, there_and_back
@@ -11,7 +13,9 @@ from rtcomp.diagnosis.baseline import baseline
 from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.growing import grow
 from rtcomp.diagnosis.play import Load, behind_play
+from rtcomp.diagnosis.selection import look
 from rtcomp.stage.balance import force_balance, zero_phase
 from rtcomp.stage.stage import Stage
 
@@ -83,3 +87,20 @@ def test_the_balance_holds_with_the_contact_that_is_there_and_with_no_other() ->
         for what, s in {"true": axis, "none": stage()}.items()
     }
     assert error["true"] < 0.25 * error["none"]
+
+
+@pytest.mark.parametrize("gap", [8e-7, 4e-6])
+def test_how_the_load_meets_its_play_is_found_with_the_gap(gap: float) -> None:
+    """A softer contact and another share than the catalogue's hide the gap: a wider one looks like them."""
+    soft = {"name": "backlash", "gap": gap, "share": 0.45, "contact": 85.0}
+    recording = run(
+        Stage.from_dict({**STAGE, "stage": {**STAGE["stage"], "effects": [soft]}}), there_and_back(16.0)
+    )
+    balance = ForceBalance(stage(), load_data([recording]))
+    fitter = Fitter(balance)
+    found = look(fitter, baseline(balance))
+    grown = grow(fitter, baseline(balance), found.candidates, found.screened, math.inf)
+    best = min(grown, key=lambda model: model.sse).entries[0]
+    assert best["name"] == "backlash"
+    for name in ("gap", "share", "contact"):
+        assert best[name] == pytest.approx(soft[name], rel=0.1)
