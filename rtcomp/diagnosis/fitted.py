@@ -58,16 +58,17 @@ class Fitted:
 
 
 def left_out(
-    grams: Grams, use: np.ndarray, prior: Prior, variance: float, whole: Floats
+    grams: Grams, use: np.ndarray, prior: Prior, variance: float, whole: Floats, numbers: int = 0
 ) -> tuple[Floats, Floats]:
     """Return squared errors (B_use,) of blocks predicted by the others, and coefficients without each.
 
     What happens in one block only keeps the size that it has in the `whole` fit there: other blocks cannot
-    tell it.
+    tell it. Not so the first coefficients, so many `numbers` of the stage.
     """
     members = np.flatnonzero(use)
     power = np.einsum("kii->ki", grams.gram[use])
     alone = power > ONCE * np.maximum(power.sum(axis=0), 1e-300)
+    alone[:, :numbers] = False
     errors, found = np.empty(members.size), []
     for i, k in enumerate(members):
         others = use.copy()

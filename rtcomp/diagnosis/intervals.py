@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.balance import BASE
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import ONCE, Fitted, left_out
 from rtcomp.diagnosis.regression import Grams
@@ -86,14 +87,18 @@ def _deviation(without: Floats) -> float:
 def _shapes_held(fitter: Fitter, fitted: Fitted) -> Fitted:
     """Return the fit with only the sizes of its effects free: what is nothing has no shape."""
     sizes = [k for k, f in enumerate(fitted.free) if f.name in ent.kind_of(fitted.entries[f.term]).linear]
-    tangents = fitted.tangents[sizes]
-    joint = np.concatenate([fitted.system.columns, tangents])
-    grams = Grams.of(joint, fitted.system.y, fitter.block, fitter.blocks)
-    wide = fitted.prior.extended(np.full(len(sizes), -np.inf), np.full(len(sizes), np.inf))
-    whole = np.concatenate([fitted.coefficients, np.zeros(len(sizes))])
-    _, without = left_out(grams, fitter.use, wide, fitted.variance, whole)
     free = tuple(fitted.free[k] for k in sizes)
-    return replace(fitted, tangents=tangents, free=free, without=without)
+    return _left_out(fitter, replace(fitted, tangents=fitted.tangents[sizes], free=free))
+
+
+def _left_out(fitter: Fitter, fitted: Fitted, numbers: int = 0) -> Fitted:
+    """Return the fit with what it is `without` each block, where that is told anew."""
+    joint = np.concatenate([fitted.system.columns, fitted.tangents])
+    grams = Grams.of(joint, fitted.system.y, fitter.block, fitter.blocks)
+    some = len(fitted.free)
+    wide = fitted.prior.extended(np.full(some, -np.inf), np.full(some, np.inf))
+    whole = np.concatenate([fitted.coefficients, np.zeros(some)])
+    return replace(fitted, without=left_out(grams, fitter.use, wide, fitted.variance, whole, numbers)[1])
 
 
 def _at_bound(value: float, low: float, high: float) -> bool:
@@ -168,7 +173,8 @@ def numbers(fitter: Fitter, believed: Stage, fitted: Fitted, *, effects: bool = 
     """
     from scipy.stats import t as student
 
-    values, sets, sizes = fitter.numbers(fitted, effects=effects)
+    # Where a fast run is in one block only, the others still tell mass and damping, though less well.
+    values, sets, sizes = fitter.numbers(_left_out(fitter, fitted, len(BASE)), effects=effects)
     spread = np.maximum(np.diag(scatter(sets)), 0.0)
     factor = float(student.ppf(0.975, max(sets.shape[0] - 1, 1)))
     half = np.sqrt(factor**2 * spread + (MODEL * values) ** 2)

@@ -1,0 +1,32 @@
+"""Intervals of the stage's numbers, by blocks left out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from recorded import RATE, run, stage
+
+from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.baseline import baseline
+from rtcomp.diagnosis.data import load_data
+from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.intervals import numbers
+from rtcomp.diagnosis.spread import MODEL
+
+
+@pytest.mark.parametrize(("bursts", "least", "most"), [(1, 3.0, 30.0), (10, 0.0, 2.0)])
+def test_a_number_that_one_block_tells_is_as_sure_as_the_others_make_it(
+    bursts: int, least: float, most: float
+) -> None:
+    """Mass shows where the axis is fast: in one block, or in all."""
+    t = np.arange(int(24.0 * RATE)) / RATE
+    slow = 1e-4 * np.sin(2 * np.pi * 0.5 * t)
+    fast = np.zeros_like(t)
+    for middle in 24.0 * (np.arange(bursts) + 0.5) / bursts if bursts > 1 else (7.0,):
+        fast += np.exp(-(((t - middle) / 0.3) ** 2)) * 2e-4 * np.sin(2 * np.pi * 9.0 * t)
+    believed = stage()
+    balance = ForceBalance(believed, load_data([run(believed, slow + fast)]))
+    found = numbers(Fitter(balance), believed, baseline(balance))
+    half = found.half[0] / found.values[0]
+    assert least * MODEL <= half <= most * MODEL
+    assert abs(found.values[0] - believed.mechanics.mass) <= found.half[0]
