@@ -14,7 +14,7 @@ from rtcomp.diagnosis.fitted import ONCE, Fitted, left_out
 from rtcomp.diagnosis.regression import Grams
 from rtcomp.diagnosis.result import Retuned, Value
 from rtcomp.diagnosis.retuned import MOVED, Numbers, believed_friction
-from rtcomp.diagnosis.spread import MODEL, elsewhere, scatter
+from rtcomp.diagnosis.spread import BALANCE, MODEL, elsewhere, scatter
 from rtcomp.kernels import Floats
 from rtcomp.stage.stage import Stage
 from rtcomp.units import for_axis
@@ -177,7 +177,22 @@ def numbers(fitter: Fitter, believed: Stage, fitted: Fitted, *, effects: bool = 
     values, sets, sizes = fitter.numbers(_left_out(fitter, fitted, len(BASE)), effects=effects)
     spread = np.maximum(np.diag(scatter(sets)), 0.0)
     factor = float(student.ppf(0.975, max(sets.shape[0] - 1, 1)))
-    half = np.sqrt(factor**2 * spread + (MODEL * values) ** 2)
+    half = np.sqrt(factor**2 * spread + (MODEL * values) ** 2 + _of_the_balance(fitter, fitted, values) ** 2)
     m = believed.mechanics
     before = np.array([m.mass, m.viscous, m.micro_damping, *believed_friction(believed), *np.abs(sizes)])
     return Numbers(before, values, half)
+
+
+def _of_the_balance(fitter: Fitter, fitted: Fitted, values: Floats) -> Floats:
+    """Return by how much each number could be another for a part of the force, (q,); nothing of a reach."""
+    found = np.zeros(values.size)
+    if not fitter.gridded:
+        return found
+    columns, rows, level = fitted.system.columns, fitter.rows, len(BASE)
+    friction = fitted.coefficients[fitter.balance.friction] @ columns[fitter.balance.friction]
+    of_one = [*columns[: len(BASE)], friction / max(float(values[level]), 1e-300)]
+    for i, column in enumerate(of_one):
+        power = float(np.mean(column[rows] ** 2))
+        if power > 0.0 and values[i] > 0.0:
+            found[i] = BALANCE * math.sqrt(float(np.mean(fitted.system.y[rows] ** 2)) / power)
+    return found

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtcomp.diagnosis.data import Data, Segment
-from rtcomp.diagnosis.spectrum import Response, interpolated, spectrum
+from rtcomp.diagnosis.spectrum import Response, interpolated, motion_spectrum, spectrum
 from rtcomp.kernels import Floats
 from rtcomp.stage.stage import Stage
 
@@ -41,7 +41,7 @@ class Noise:
         Noise that is larger than all there is at some frequency is not there; where a stage says nothing,
         the weakest band of the spectrum tells how much there can be.
         """
-        frequency, density = spectrum([s.position for s in data.segments], data.rate)
+        frequency, density = motion_spectrum([s.position for s in data.segments], data.rate)
         most = float(np.sqrt(density.min() * 0.5 * data.rate))
         stated = cls.stated(stage)
         rms = min(max(stated, 0.1 * most), most) if stated > 0.0 else most

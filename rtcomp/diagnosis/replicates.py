@@ -39,9 +39,9 @@ def null_of(
     """Return the null distribution beside a fitted model.
 
     Replicates are drawn until it is plain whether `gain` and the error of the fit are beyond them: sequential
-    Monte Carlo (Besag and Clifford 1991, Biometrika 78(2)). The first few tell what a full fit adds to a gain
-    of first order. A model that cannot be kept on the recorded motion is judged by surrogates of its residual
-    instead. After the time `ends` (time.monotonic) gains are those of first order.
+    Monte Carlo (Besag and Clifford 1991, Biometrika 78(2)). A model that cannot be kept on the recorded
+    motion is judged by surrogates of its residual instead. After the time `ends` (time.monotonic) gains are
+    those of first order.
     """
     balance = fitter.balance
     try:
@@ -67,7 +67,7 @@ def null_of(
             look = Screen(made, other.block, other.blocks, other.use)
             gains += zip(made, look.gains(free_columns(again), again.residual), strict=True)
         scale = fitter.power / max(other.power, 1e-300)
-        gain, fully = largest(other, again, gains, ends if number < FEW else -math.inf)
+        gain, fully = largest(other, again, gains, ends)
         return gain, fully, again.errors * scale
 
     found: list[tuple[float, float, Floats]] = []
@@ -79,11 +79,8 @@ def null_of(
             return _surrogates(fitter, fitted, screen, seed)
         gains, fully, errors = (np.array(each) for each in zip(*found, strict=True))
         chance = np.append(chance, _by_chance(fitted, screen, 1000 * seed + first, gains.size - chance.size))
-        if first == 0:  # what a full fit adds to a gain, it adds to those that are not fitted in full as well
-            some = gains > 0.0
-            more = float(np.median(fully[some] / gains[some])) if np.any(some) else 1.0
-            few = gains.size
-        fully[few:] *= more
+        some = gains > 0.0  # what a full fit adds to gains on replicates, it adds to those by chance
+        more = float(np.median(fully[some] / gains[some])) if np.any(some) else 1.0
         null = Null(_mixed(fitted, fully, errors.sum(axis=1), more * chance), errors)
         if null.plain(gain, fitted.errors, LEVEL):
             break

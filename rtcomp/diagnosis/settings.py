@@ -7,9 +7,9 @@ LEAST_GAIN = 0.02
 """Least part of the initial rms error by which an effect must lower the rms error. Below it an effect may be
 real, but does not matter; much above it what stands beside a strong effect is not looked for."""
 
-NEGLIGIBLE = 1e-3
+NEGLIGIBLE = 3e-3
 """Least force by which an effect must change a model, over that of the drive, both rms: equations of motion
-in rows of a recording are wrong in the fourth digit, however well a sensor sees it."""
+in rows of a recording are wrong in the third digit, however well a sensor sees it."""
 
 REPLICATES = 19
 """Bootstrap replicates behind the null distribution: more make its tail surer and the answer later."""

@@ -157,6 +157,16 @@ def spectrum(rows: list[Floats], rate: float) -> tuple[Floats, Floats]:
     return centre, density
 
 
+def motion_spectrum(positions: list[Floats], rate: float) -> tuple[Floats, Floats]:
+    """Return frequencies (Hz) and the power density (m^2/Hz) of positions (m, (K,) each), as `spectrum` does.
+
+    By their second differences, whose density is as many times that of position at every frequency. A stroke
+    may be ten million times the sensor's noise, and what leaks of it past a window would pass for motion.
+    """
+    frequency, density = spectrum([np.diff(x, 2) for x in positions], rate)
+    return frequency, density / (2.0 * np.sin(np.pi * frequency / rate)) ** 4
+
+
 def interpolated(frequency: Floats, density: Floats) -> Response:
     """Return a response through positive `density` (F,) at `frequency` (Hz), on logarithmic axes."""
     known, level = np.log(frequency), np.log(np.maximum(density, 1e-300))

@@ -9,6 +9,9 @@ from rtcomp.kernels import Floats
 MODEL = 0.015
 """Relative half width of an interval that no data removes: kernels are models, rows are discrete. As much as
 trials' plants of other physics were missed by where all else was certain."""
+BALANCE = 2e-3
+"""Part of the drive's force (rms, as the fit weighs frequencies) up to which the balance in rows says nothing
+of a number: what is a hundredth of the force is known to a fifth. Measured as MODEL was."""
 
 
 def elsewhere(column: Floats, residual: Floats) -> float:

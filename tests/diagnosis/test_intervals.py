@@ -30,3 +30,17 @@ def test_a_number_that_one_block_tells_is_as_sure_as_the_others_make_it(
     half = found.half[0] / found.values[0]
     assert least * MODEL <= half <= most * MODEL
     assert abs(found.values[0] - believed.mechanics.mass) <= found.half[0]
+
+
+def test_a_number_of_little_force_is_known_less_well() -> None:
+    """Kernels and rows are right to a part of the force, whatever the noise."""
+    t = np.arange(int(24.0 * RATE)) / RATE
+    motion = 1e-4 * np.sin(2 * np.pi * 0.5 * t) + 2e-5 * np.sin(2 * np.pi * 5.0 * t)
+    half = {}
+    for viscous in (8.0, 800.0):
+        believed = stage(viscous=viscous)
+        balance = ForceBalance(believed, load_data([run(believed, motion)]))
+        found = numbers(Fitter(balance), believed, baseline(balance))
+        half[viscous] = found.half[1] / viscous
+        assert abs(found.values[1] - viscous) <= found.half[1]
+    assert half[800.0] < 3.0 * MODEL < 0.1 < half[8.0]

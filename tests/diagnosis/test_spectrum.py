@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtcomp.diagnosis.spectrum import filtered, spectrum
+from rtcomp.diagnosis.spectrum import filtered, motion_spectrum, spectrum
 from rtcomp.kernels import Floats
 
 
@@ -32,6 +32,16 @@ def test_a_spectrum_has_the_power_of_the_signal() -> None:
     noise = 0.3 * random.standard_normal(60_000)
     frequency, density = spectrum([noise], 500.0)
     assert np.median(density[frequency > 10.0]) == pytest.approx(0.09 / 250.0, rel=0.05)
+
+
+@pytest.mark.parametrize("stroke", [1e-4, 1e-2, 1.0])
+def test_a_long_stroke_does_not_leak_into_what_is_noise(stroke: float) -> None:
+    """Moves at constant acceleration: of 1e8 times the noise a window leaks more than the noise."""
+    period = np.concatenate([np.full(500, 1.0), np.full(1000, -1.0), np.full(500, 1.0)])
+    moves = np.cumsum(np.cumsum(np.tile(period, 15)))
+    noise = 1e-8 * np.random.default_rng(4).standard_normal(moves.size)
+    frequency, density = motion_spectrum([stroke * moves / np.ptp(moves) + noise], 1000.0)
+    assert np.median(density[frequency > 350.0]) == pytest.approx(1e-16 / 500.0, rel=0.1)
 
 
 def test_noise_at_an_end_is_no_step() -> None:
