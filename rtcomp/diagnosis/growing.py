@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 
@@ -27,14 +28,17 @@ def grow(
 ) -> list[Fitted]:
     """Return the model with each of the best candidates, fitted in full."""
     families: dict[str, list[Term]] = {}
+    gains: dict[str, float] = {}
     for i in np.argsort([-s.gain for s in screened], kind="stable").tolist():
         families.setdefault(made[i].family, []).append(started(made[i], screened[i].sizes))
+        gains.setdefault(made[i].family, screened[i].gain)
+    least = min([*gains.values()][:FULL_FITS], default=0.0)
     terms = fitter.rough(model, list(families.values()), FULL_FITS, ends)
     # First order is no guide to what is behind a play: its own motion is followed from place to place.
     behind = {c.name: c.term for c in made if fitter.gridded and ent.kind_of(c.term.entry).behind}
     terms = [t for t in terms if t.entry["name"] not in behind]
     for term in behind.values():
-        terms += _scanned(fitter, model, term, ends)
+        terms += _scanned(fitter, model, term, least, ends)
 
     found = shared(lambda term: _fitted(fitter, model, term, ends), terms)
     return [f for f in found if f is not None]
@@ -50,12 +54,12 @@ def _fitted(fitter: Fitter, model: Fitted, term: Term, ends: float) -> Fitted | 
         return None
 
 
-def _scanned(fitter: Fitter, model: Fitted, term: Term, ends: float) -> list[Term]:
+def _scanned(fitter: Fitter, model: Fitted, term: Term, least: float, ends: float) -> list[Term]:
     """Return the term at the length at which a model with it fits best; none where it fits best without.
 
-    And with those numbers free too that else have their defaults: how a load meets the ends of its play
-    decides which length fits. They are looked through one after the other, frequencies first, of which many
-    fit almost, then the length again.
+    Where this gains as much as the `least` of what is fitted in full, also with those numbers free that else
+    have their defaults: how a load meets the ends of its play decides which length fits. They are looked
+    through one after the other, frequencies first, of which many fit almost, then the length again.
     """
     length = next(p.name for p in ent.free_parameters(term.entry, linear=False) if p.unit == "m")
     stated = [p for p in ent.kind_of(term.entry).parameters if p.default is not None]
@@ -77,6 +81,8 @@ def _scanned(fitter: Fitter, model: Fitted, term: Term, ends: float) -> list[Ter
     left, alone = best(term.entry, length, lengths.tolist())
     if left >= model.sse:
         return []
+    if math.log(model.sse / left) < least:
+        return [term.with_entry(alone)]
     entry = {**{p.name: p.default for p in stated}, **alone}
     for p in sorted(stated, key=lambda p: p.unit != "Hz"):
         values = float(entry[p.name]) * np.geomspace(1.0 / AWAY, AWAY, SCANNED)
