@@ -58,7 +58,8 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         rest = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
         models = [chosen, *_others(fitter, found, i, rest, ends)]
         errors = [_by_cell(fitter, m, i if m is chosen else len(m.terms) - 1) for m in models]
-        weight = probabilities(errors, _independent(fitter, chosen) / errors[0].size)
+        rows = _independent(fitter, chosen) / errors[0].size
+        weight = probabilities(errors, rows, [m.size for m in models])
         alike = confidence_set(errors, SET_LEVEL)
         plainer = min(alike, key=lambda k: (models[k].size, -weight[k]))
         if models[plainer].size < chosen.size and weight[plainer] > weight[0]:

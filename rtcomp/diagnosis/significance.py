@@ -118,16 +118,19 @@ def confidence_set(errors: Sequence[Floats], level: float, seed: int = 0, draws:
     return members
 
 
-def probabilities(errors: Sequence[Floats], rows: float, seed: int = 0, draws: int = 1000) -> Floats:
+def probabilities(
+    errors: Sequence[Floats], rows: float, sizes: Sequence[int], seed: int = 0, draws: int = 1000
+) -> Floats:
     """Return the weights (M,) of models by pseudo-BMA with a Bayesian bootstrap over blocks (pseudo-BMA+).
 
-    `errors` are squared errors of blocks left out, (B,) each, of `rows` independent numbers (Yao, Vehtari,
-    Simpson, Gelman 2018, Bayesian Analysis 13(3)).
+    `errors` are squared errors in blocks, (B,) each, of `rows` independent numbers (Yao, Vehtari, Simpson,
+    Gelman 2018, Bayesian Analysis 13(3)). They are of fits to these rows, which each of its parameters, so
+    many as `sizes` says, makes likelier by one than they are elsewhere (Akaike 1974, IEEE Trans. AC 19(6)).
     """
     loss = -0.5 * np.log(np.array(errors)) * rows
     random = np.random.default_rng(seed)
     weights = random.dirichlet(np.ones(loss.shape[1]), draws)
-    score = loss.shape[1] * weights @ loss.T
+    score = loss.shape[1] * weights @ loss.T - np.asarray(sizes, dtype=np.float64)
     score -= score.max(axis=1, keepdims=True)
     each = np.exp(score)
     each /= each.sum(axis=1, keepdims=True)

@@ -106,8 +106,10 @@ def test_a_model_that_is_worse_in_every_block_is_not_in_the_confidence_set(seed:
     members = confidence_set(models, 0.05)
     assert 0 in members or 2 in members
     assert 1 not in members
-    weights = probabilities(models, 200.0)
+    weights = probabilities(models, 200.0, [1, 1, 1][: len(models)])
     assert weights.sum() == pytest.approx(1.0) and weights[1] < 0.01
+    alike = probabilities([models[0], models[0]], 200.0, [1, 4])
+    assert alike[0] / alike[1] == pytest.approx(np.exp(3.0))
     assert log_gain(models[1], models[0]) > 0.0
 
 
