@@ -35,7 +35,7 @@ def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, e
     gained = math.sqrt(before.sum()) - math.sqrt(after.sum())
     if p >= LEVEL or gained <= LEAST_GAIN * math.sqrt(everything):
         return False
-    return fitter.between(parent, model) > NEGLIGIBLE
+    return fitter.relative(parent) ** 2 - fitter.relative(model) ** 2 > NEGLIGIBLE**2
 
 
 def exhausted(fitter: Fitter, model: Fitted, everything: float) -> bool:

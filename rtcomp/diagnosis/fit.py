@@ -134,10 +134,6 @@ class Fitter:
         """Return what a model leaves over what there is to explain, rms of both, without the reserved."""
         return self._over_drive(self.force(model))
 
-    def between(self, one: Fitted, other: Fitted) -> float:
-        """Return by how much two models differ, over the same."""
-        return self._over_drive(self.force(one) - self.force(other))
-
     def relative_of(self, stage: Stage) -> float:
         """Return what any stage leaves as it is, over the same."""
         drive, needed = self.balance.both_sides(stage)

@@ -86,8 +86,8 @@ def _scanned(fitter: Fitter, model: Fitted, term: Term, least: float, ends: floa
     entry = {**{p.name: p.default for p in stated}, **alone}
     for p in sorted(stated, key=lambda p: p.unit != "Hz"):
         values = float(entry[p.name]) * np.geomspace(1.0 / AWAY, AWAY, SCANNED)
-        entry = best(entry, p.name, values[(values > p.lowest) & (values < ent.highest(entry, p))].tolist())[
-            1
-        ]
-    entry = best(entry, length, (float(entry[length]) * np.geomspace(1.0 / AWAY, 1.0, SCANNED)).tolist())[1]
+        values = values[(values > p.lowest) & (values < ent.highest(entry, p))]
+        _, entry = best(entry, p.name, values.tolist())
+    shorter = float(entry[length]) * np.geomspace(1.0 / AWAY, 1.0, SCANNED)
+    _, entry = best(entry, length, shorter.tolist())
     return [term.with_entry(alone), Term.of(entry)]

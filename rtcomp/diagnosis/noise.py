@@ -38,12 +38,13 @@ class Noise:
     def of(cls, stage: Stage, data: Data) -> Noise:
         """Take the noise that the stage states, within what the recording can have; else the recording's.
 
-        Noise that is larger than all there is at some frequency is not there; where a stage says nothing,
-        the weakest band of the spectrum tells how much there can be.
+        Noise that is larger than all there is at some frequency is not there. Where a stage says nothing, all
+        that stands in the weakest band, be it leaked from the motion, counts as noise: too much of it says
+        less, too little makes a finding of whatever is open.
         """
-        frequency, density = motion_spectrum([s.position for s in data.segments], data.rate)
+        positions, stated = [s.position for s in data.segments], cls.stated(stage)
+        frequency, density = (motion_spectrum if stated > 0.0 else spectrum)(positions, data.rate)
         most = float(np.sqrt(density.min() * 0.5 * data.rate))
-        stated = cls.stated(stage)
         rms = min(max(stated, 0.1 * most), most) if stated > 0.0 else most
         floor = rms**2 / (0.5 * data.rate)
         share = np.maximum(1.0 - floor / density, 0.0)

@@ -125,10 +125,6 @@ class Trajectory(Fitter):
         """See `Fitter`: error over travel."""
         return self._relative(model.residual)
 
-    def between(self, one: Fitted, other: Fitted) -> float:
-        """See `Fitter`."""
-        return self._relative(one.residual - other.residual)
-
     def relative_of(self, stage: Stage) -> float:
         """See `Fitter`."""
         return self._relative(self._bent(self.windows.off(stage)))
