@@ -241,9 +241,8 @@ class ForceBalance(Signals):
         everything = [*self.believed, *entries]
         adding = [ent.adds_force(ent.kind_of(e)) for e in everything]
         work = [*self._fixed, *(ent.build(e) for e, adds in zip(everything, adding, strict=True) if not adds)]
-        changing = [
-            e for e in work if e.place is Place.FRICTION
-        ]  # what others bring is made with the columns
+        # What effects other than friction's bring along is made with the columns.
+        changing = [e for e in work if e.place is Place.FRICTION]
         return everything, adding, [*work, *(brought for e in changing for brought in e.companions())]
 
     def _plain_drive(self) -> Floats:

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.candidates import candidates, started
-from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.growing import fitted_in_time
 from rtcomp.diagnosis.other_forms import in_any_form
 from rtcomp.diagnosis.replicates import best, free_columns
 from rtcomp.diagnosis.screening import Screen
 from rtcomp.diagnosis.selection import Search
 from rtcomp.diagnosis.settings import ALIAS
 from rtcomp.diagnosis.significance import confidence_set, log_gain, probabilities
-from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
 SET_LEVEL = 0.05
@@ -138,16 +136,5 @@ def _others(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -
     tried = [
         k for k in best([c.family for c in made], [s.gain for s in screened], 3) if screened[k].gain > least
     ]
-    return _fitted(fitter, rest, [started(made[k], screened[k].sizes) for k in tried], ends)
-
-
-def _fitted(fitter: Fitter, rest: Fitted, terms: Sequence[Term], ends: float) -> list[Fitted]:
-    def fit(term: Term) -> Fitted | None:
-        if time.monotonic() > ends:
-            return None
-        try:
-            return fitter.fit([*rest.terms, term], rest)
-        except (ConfigError, np.linalg.LinAlgError):
-            return None
-
-    return [m for m in shared(fit, terms) if m is not None and not m.at_bound]
+    terms = [started(made[k], screened[k].sizes) for k in tried]
+    return [m for m in fitted_in_time(fitter, rest, terms, ends) if not m.at_bound]

@@ -39,19 +39,21 @@ def grow(
     terms = [t for t in terms if t.entry["name"] not in behind]
     for term in behind.values():
         terms += _scanned(fitter, model, term, least, ends)
-
-    found = shared(lambda term: _fitted(fitter, model, term, ends), terms)
-    return [f for f in found if f is not None]
+    return fitted_in_time(fitter, model, terms, ends)
 
 
-def _fitted(fitter: Fitter, model: Fitted, term: Term, ends: float) -> Fitted | None:
-    """Return the model with a term, fitted; None where that is impossible, or after the time `ends`."""
-    if time.monotonic() > ends:
-        return None
-    try:
-        return fitter.fit([*model.terms, term], model)
-    except (ConfigError, np.linalg.LinAlgError):
-        return None
+def fitted_in_time(fitter: Fitter, model: Fitted, terms: Sequence[Term], ends: float) -> list[Fitted]:
+    """Return the model with each term, fitted, where that is possible; none is begun after `ends` (s)."""
+
+    def fit(term: Term) -> Fitted | None:
+        if time.monotonic() > ends:
+            return None
+        try:
+            return fitter.fit([*model.terms, term], model)
+        except (ConfigError, np.linalg.LinAlgError):
+            return None
+
+    return [f for f in shared(fit, terms) if f is not None]
 
 
 def _scanned(fitter: Fitter, model: Fitted, term: Term, least: float, ends: float) -> list[Term]:

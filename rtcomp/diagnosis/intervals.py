@@ -92,7 +92,7 @@ def _shapes_held(fitter: Fitter, fitted: Fitted) -> Fitted:
 
 
 def _left_out(fitter: Fitter, fitted: Fitted, numbers: int = 0) -> Fitted:
-    """Return the fit with what it is `without` each block, where that is told anew."""
+    """Return the fit with its coefficients `without` each block computed again."""
     joint = np.concatenate([fitted.system.columns, fitted.tangents])
     grams = Grams.of(joint, fitted.system.y, fitter.block, fitter.blocks)
     some = len(fitted.free)

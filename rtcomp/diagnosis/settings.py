@@ -9,7 +9,8 @@ real, but does not matter; much above it what stands beside a strong effect is n
 
 NEGLIGIBLE = 3e-3
 """Least force that an effect must explain, over that of the drive, both rms: equations of motion in rows of a
-recording are wrong in the third digit, however well a sensor sees it. At 1e-3 a clean one crept."""
+recording are wrong in the third digit, however well a sensor sees it. At 1e-3 creep was named where nothing
+was missing."""
 
 REPLICATES = 19
 """Bootstrap replicates behind the null distribution: more make its tail surer and the answer later."""
