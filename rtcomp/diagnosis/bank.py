@@ -83,8 +83,9 @@ def units_along(
     needed = parts_of([*before, *after], row)
     parts = max(needed, least_parts)
     times = weights if sizes is None else sizes
-    out = np.empty((motion.shape[0], SPEED_UNITS + (len(reaches) if sizes is None else 1)))
-    mean = np.zeros_like(out) if parts > 1 else out[:1]
+    columns = SPEED_UNITS + (len(reaches) if sizes is None else 1)
+    out = np.empty((motion.shape[0], columns if parts == 1 else SPEED_UNITS))
+    mean = np.zeros((motion.shape[0] if parts > 1 else 1, columns))
     w = np.zeros(COUNT)
     w[GRAIN] = grain
     base = np.array([stage.mass, stage.force_constant])
@@ -95,11 +96,11 @@ def units_along(
         program.steps, program.p, program.s, w, base, motion, parts, smooth, whole, len(before), len(bent),
         stiffer, weights, reaches, deflection, sizes is not None, times, out, mean,
     )  # fmt: skip
-    for table in (out,) if smooth else (out, mean):
-        table[:, 2] = (table[:, 2] - table[:, 1]) / np.log1p(FASTER)
+    found = around_rows(out) if parts == 1 else mean
     if smooth:
-        mean[:, :SPEED_UNITS] = around_rows(out[:, :SPEED_UNITS])
-    return around_rows(out) if parts == 1 else mean
+        found[:, :SPEED_UNITS] = around_rows(out)
+    found[:, 2] = (found[:, 2] - found[:, 1]) / np.log1p(FASTER)
+    return found
 
 
 @compiled
@@ -139,13 +140,13 @@ def _along(
 
     After them comes what each element holds, or `summed` up, `times` so many each.
 
-    Where these are `smooth` between rows, they are only at the ends of rows. Where nothing changes or asks
-    for the `whole` of friction, it is not summed up.
+    Where rows are cut into `parts`, fill `mean` with their means around each row instead: over the row before
+    it weighed by what has passed of that, and over the row after it by what is to come. Units of speed that
+    are `smooth` between rows are at the ends of rows, in `out`.
 
-    Where rows are cut into `parts`, also their `mean` around each row: over the row before it weighed by what
-    has passed of that, and over the row after it by what is to come. After those units come `bent` effects
-    that bend branches. What else changes the whole of friction is shared out among the elements in proportion
-    to what each holds.
+    Where nothing changes or asks for the `whole` of friction, it is not summed up. After the units of speed
+    come `bent` effects that bend branches. What else changes the whole of friction is shared out among the
+    elements in proportion to what each holds.
     """
     count = weights.size
     then = first + SPEED_UNITS
@@ -153,7 +154,7 @@ def _along(
     for i in range(count):
         level += weights[i] * reaches[i]
         stiffness += stiffer * weights[i]
-    last, held = np.zeros(out.shape[1]), np.empty(count)
+    here, last, held = np.zeros(mean.shape[1]), np.zeros(mean.shape[1]), np.empty(count)
     for k in range(motion.shape[0]):
         for j in range(1, parts + 1):
             along_row(w, motion, k, float(j), parts)
@@ -164,18 +165,27 @@ def _along(
                 for i in range(SPEED_UNITS):
                     w[FRICTION] = 0.0
                     run_chain(steps, p, s, w, first + i, first + i + 1)
-                    out[k, i] = w[FRICTION]
+                    here[i] = w[FRICTION]
             _stretch(w[MOVED], w[REACH], w[SCALE], w[SOFTENS], reaches, deflection, held)
             if whole:
                 _whole(steps, p, s, w, then, bent, level, stiffness, weights, reaches, held)
             if summed:
-                out[k, SPEED_UNITS] = 0.0
-                for i in range(count):
-                    out[k, SPEED_UNITS] += times[i] * held[i]
+                here[SPEED_UNITS] = _total(times, held)
             else:
-                out[k, SPEED_UNITS:] = held
+                for i in range(count):
+                    here[SPEED_UNITS + i] = held[i]
             if parts > 1:
-                _share_out(mean, out, last, k, j, parts)
+                _share_out(mean, here, last, k, j, parts)
+        for i in range(out.shape[1]):
+            out[k, i] = here[i]
+
+
+@compiled
+def _total(times: Floats, held: Floats) -> float:
+    total = 0.0
+    for i in range(held.size):
+        total += times[i] * held[i]
+    return total
 
 
 @compiled
@@ -207,9 +217,7 @@ def _whole(
     held: Floats,
 ) -> None:
     """Change the whole of friction by the effects from `first` on, and what each element holds of it."""
-    total = 0.0
-    for i in range(weights.size):
-        total += weights[i] * held[i]
+    total = _total(weights, held)
     # The whole is what the chain sees from here on, and at the next step.
     w[GRIP], w[GRIP_LEVEL], w[GRIP_STIFFNESS] = total, level, stiffness
     w[FRICTION] = total
@@ -224,29 +232,25 @@ def _whole(
 
 
 @compiled
-def _third(of: Floats, mean: Floats) -> None:
-    for i in range(of.size):
-        mean[i] += of[i] / 3.0
-
-
-@compiled
-def _share_out(mean: Floats, out: Floats, last: Floats, k: int, j: int, parts: int) -> None:
-    """Add part `j` of row `k` to the mean forces around rows; `last` are the forces at the part's beginning.
+def _share_out(mean: Floats, here: Floats, last: Floats, k: int, j: int, parts: int) -> None:
+    """Add part `j` of row `k` to the mean forces around rows: `here` at its end, `last` at its beginning.
 
     What comes after the last row is taken to be as before it.
     """
     end = mean.shape[0] - 1
     if parts == 2:  # a parabola through both ends and the middle, weighed by the triangle
-        _third(out[k], mean[k])
-        if j == 1 and k > 0:
-            _third(out[k], mean[k - 1])
-        if j == 2 and k == end:
-            _third(out[k], mean[k])
+        for i in range(here.size):
+            third = here[i] / 3.0
+            mean[k, i] += third
+            if j == 1 and k > 0:
+                mean[k - 1, i] += third
+            if j == 2 and k == end:
+                mean[k, i] += third
         return
     passed = (j - 0.5) / parts
-    for i in range(out.shape[1]):
-        share = 0.5 * (last[i] + out[k, i]) / parts
-        last[i] = out[k, i]
+    for i in range(here.size):
+        share = 0.5 * (last[i] + here[i]) / parts
+        last[i] = here[i]
         mean[k, i] += passed * share
         if k > 0:
             mean[k - 1, i] += (1.0 - passed) * share

@@ -39,7 +39,23 @@ def grow(
     terms = [t for t in terms if t.entry["name"] not in behind]
     for term in behind.values():
         terms += _scanned(fitter, model, term, least, ends)
-    return fitted_in_time(fitter, model, terms, ends)
+    found = fitted_in_time(fitter, model, terms, ends)
+    return [*found, *fitted_in_time(fitter, model, _in_better_form(fitter, model, found), ends)]
+
+
+def _in_better_form(fitter: Fitter, model: Fitted, found: Sequence[Fitted]) -> list[Term]:
+    """Return the last terms that leave less in another form as they are: first order may not tell forms."""
+    better = []
+    for larger in found:
+        term = larger.terms[-1]
+        kind = ent.kind_of(term.entry)
+        for p in kind.parameters:
+            if p.name not in term.entry or not ent.is_form(kind, p):
+                continue
+            others = [v for v in (kind.search_grid.get(p.name) or (p.low, p.high)) if v != term.entry[p.name]]
+            made = [term.with_entry({**term.entry, p.name: value}) for value in others]
+            better += [one for one in made if fitter.quick([*larger.terms[:-1], one]) < larger.sse]
+    return better
 
 
 def fitted_in_time(fitter: Fitter, model: Fitted, terms: Sequence[Term], ends: float) -> list[Fitted]:

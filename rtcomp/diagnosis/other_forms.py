@@ -25,8 +25,8 @@ from rtcomp.physics import Effect
 if TYPE_CHECKING:
     from rtcomp.diagnosis.fit import Fitter
 
-OVERTONES = (2, 3)
-"""Orders of the overtones that another form of a wave may have."""
+OTHERS = (1 / 2, 1 / 3, 2.0, 2 / 3)
+"""Periods of what another form has beside its strongest wave, the first or second, over that of this one."""
 LONGER = 0.02
 """Step of the derivative by the period, in waves over the stroke: a period that was fitted without overtones
 is biased."""
@@ -53,8 +53,10 @@ def overtones(fitter: Fitter, model: Fitted, entry: Entry) -> Floats:
         return np.zeros((0, model.residual.size))
     still = {n: ent.neutral(kind, n) for n in kind.linear if n in entry and n != ent.AMPLITUDE}
     found = []
-    for times in OVERTONES:
-        period = float(entry[ent.PERIOD]) / times
+    for over in OTHERS:
+        period = float(entry[ent.PERIOD]) * over
+        if 2.0 * period > high - low:
+            continue
         made = []
         for longer in (0.0, LONGER * period / (high - low)):
             other = {**entry, **still, ent.PERIOD: period * (1.0 + longer)}

@@ -251,5 +251,6 @@ class FrictionalLag(Effect):
     example = {"time_constant": 2e-2}
     neutral = {"time_constant": 0.0}
     linear = ("time_constant",)
+    search_grid = {"following": (0.0, 1.0)}
     order = 5
     states = 2

@@ -196,6 +196,7 @@ def test_another_form_of_a_wave_has_its_overtones_and_no_other_waves(name: str) 
 
     assert left(0.5e-4) < 0.01
     assert left(1.002 * 0.5e-4) < 0.3
+    assert left(2.0e-4) < 0.03
     assert left(0.77e-4) > 0.8
 
 
