@@ -35,9 +35,9 @@ class Stepped(Protocol):
         """Return the residual (n,) of numbers `c` (p,) and `terms`; raise ConfigError where out of range."""
 
     def moved(
-        self, c: Floats, terms: list[Term], steps: int, *, entries: bool
+        self, c: Floats, terms: list[Term], steps: int, *, entries: bool, slopes: Floats | None = None
     ) -> tuple[Floats, list[Term], float]:
-        """Return numbers and terms after `steps`, and what they leave."""
+        """Return numbers and terms after `steps`, and what they leave; `slopes` are of a model nearby."""
 
 
 def likeliest(
@@ -55,7 +55,8 @@ def likeliest(
         if time.monotonic() > ends:
             return math.inf, start[1]
         try:
-            _, moved, left = fitter.moved(model.coefficients, [*model.terms, start[1]], FEW, entries=True)
+            terms, slopes = [*model.terms, start[1]], model.system.columns
+            _, moved, left = fitter.moved(model.coefficients, terms, FEW, entries=True, slopes=slopes)
         except (ConfigError, np.linalg.LinAlgError):
             return math.inf, start[1]
         return left, moved[-1]

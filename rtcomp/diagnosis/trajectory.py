@@ -203,15 +203,20 @@ class Trajectory(Fitter):
             released[levels] += math.log(RELEASED)
             begun += [released] if levels else []
         few = starting.FEW if len(begun) > 1 else 0
-        tried = [self.moved(one, list(terms), few, entries=True) for one in begun]
+        near = None if start is None else start.system.columns
+        tried = [self.moved(one, list(terms), few, entries=True, slopes=near) for one in begun]
         c, found, _ = min(tried, key=lambda t: t[2])
-        c, found, _ = self.moved(c, found, max(steps, starting.FEW), entries=steps > 0)
+        c, found, _ = self.moved(c, found, max(steps, starting.FEW), entries=steps > 0, slopes=near)
         return self._ended(c, found)
 
     def moved(
-        self, c: Floats, terms: list[Term], steps: int, *, entries: bool
+        self, c: Floats, terms: list[Term], steps: int, *, entries: bool, slopes: Floats | None = None
     ) -> tuple[Floats, list[Term], float]:
-        """Return numbers and terms after Levenberg-Marquardt steps, and what they leave with the prior."""
+        """Return numbers and terms after Levenberg-Marquardt steps, and what they leave with the prior.
+
+        `slopes` (p, n) along the numbers may be those of a model nearby. From step to step they are corrected
+        by what the step did (Broyden 1965, Math. Comp. 19(92)), and taken anew where they lead no further.
+        """
         prior, use = self.belief.prior, self.use
         rest = self.residual(c, terms)
         count = int(self.rows.sum())
@@ -223,8 +228,10 @@ class Trajectory(Fitter):
         damping = 1e-2
         for _ in range(steps):
             free = all_free_of(terms, self.balance) if entries else []
-            columns = self._slopes(c, terms, free, rest)
-            y = rest + c @ columns[: c.size]
+            known = slopes is not None
+            own = slopes if slopes is not None else self._slopes(c, terms, rest)
+            columns = np.concatenate([own, self._slopes_of(c, terms, free, rest)])
+            y = rest + c @ own
             grams = Grams.of(columns, y, self.block, self.blocks)
             power = np.diag(grams.gram[use].sum(axis=0)) / max(variance, 1e-300)
             before, better = left(c, rest, variance), False
@@ -248,43 +255,56 @@ class Trajectory(Fitter):
                     better = True
                     break
                 damping *= 8.0
-            if not better:
-                break
-            c, terms, rest = other, trial, after
-            damping = max(0.2 * damping, 1e-5)
-            if left(c, rest, variance) > (1.0 - SETTLED) * before:
-                break
+            if better:
+                gone = np.concatenate([other - c, [f.get(trial) - f.get(terms) for f in free]])
+                off = rest - after - gone @ columns
+                slopes = own + np.outer(gone[: c.size], off) / max(float(gone @ gone), 1e-300)
+                c, terms, rest = other, trial, after
+                damping = max(0.2 * damping, 1e-5)
+            if not better or left(c, rest, variance) > (1.0 - SETTLED) * before:
+                if not known:
+                    break
+                slopes, damping = None, 1e-2
             variance = float(np.sum(rest[self.rows] ** 2)) / count
         return c, terms, left(c, rest, variance)
 
-    def _slopes(self, c: Floats, terms: list[Term], free: Sequence[Free], rest: Floats) -> Floats:
-        """Return what the model changes by with each number and each free parameter, (p + q, n)."""
+    def _slopes(self, c: Floats, terms: list[Term], rest: Floats) -> Floats:
+        """Return what the model changes by with each number, (p, n)."""
 
         def one(i: int) -> Floats:
-            for way in (1.0, -1.0):
-                other, trial = c.copy(), list(terms)
-                if i < c.size:
-                    other[i] += way * STEP
-                    moved = way * STEP
-                else:
-                    f = free[i - c.size]
-                    f.put(trial, f.get(terms) + way * f.step)
-                    moved = f.get(trial) - f.get(terms)
-                if moved == 0.0:
-                    continue
+            for way in (STEP, -STEP):
+                other = c.copy()
+                other[i] += way
                 try:
-                    return (rest - self.residual(other, trial)) / moved
+                    return (rest - self.residual(other, terms)) / way
                 except ConfigError:
                     continue
             return np.zeros_like(rest)
 
-        return np.array(shared(one, range(c.size + len(free))))
+        return np.array(shared(one, range(c.size)))
+
+    def _slopes_of(self, c: Floats, terms: list[Term], free: Sequence[Free], rest: Floats) -> Floats:
+        """Return what the model changes by with each free parameter, (q, n)."""
+
+        def one(f: Free) -> Floats:
+            for way in (f.step, -f.step):
+                trial = list(terms)
+                f.put(trial, f.get(terms) + way)
+                moved = f.get(trial) - f.get(terms)
+                if moved == 0.0:
+                    continue
+                try:
+                    return (rest - self.residual(c, trial)) / moved
+                except ConfigError:
+                    continue
+            return np.zeros_like(rest)
+
+        return np.array(shared(one, free)) if free else np.zeros((0, rest.size))
 
     def _ended(self, c: Floats, terms: list[Term]) -> Fitted:
         rest = self.residual(c, terms)
         free = all_free_of(terms, self.balance)
-        columns = self._slopes(c, terms, free, rest)
-        own, tangents = columns[: c.size], columns[c.size :]
+        own, tangents = self._slopes(c, terms, rest), self._slopes_of(c, terms, free, rest)
         y = rest + c @ own
         nowhere = slice(c.size, c.size)
         system = System(y, own, (nowhere,) * (len(self.balance.believed) + len(terms)))
