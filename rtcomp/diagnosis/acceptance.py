@@ -103,14 +103,15 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
     more = null is not None and null.p_of_error(chosen.errors) < LEVEL
     noise = null.noise if null is not None else 0.0
     beyond = max(1.0 - noise / max(float(chosen.errors.sum()), 1e-300), 0.0)
+    # A wave of any form is the same effect: what only makes its form another is not left.
+    others = [fitter.overtones(chosen, i) for i in range(len(chosen.terms))]
+    rest = in_any_form(fitter, chosen, np.concatenate([np.zeros((0, chosen.residual.size)), *others]))
     for i, span in enumerate(told(fitter, chosen)):
         why = "its size may be nothing" if span.nothing else ""
         why = f"{', '.join(span.bound)} at its bound" if span.bound else why
         left = 1.0
         if not why:
             without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
-            # A wave of any form is the same effect: what only makes its form another is not left.
-            rest = in_any_form(fitter, chosen, fitter.overtones(chosen, i))
             left, there = (fitter.above_noise(model, louder) ** 2 for model in (rest, without))
             left *= beyond / max(there, 1e-300)
             why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""

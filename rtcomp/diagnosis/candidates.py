@@ -32,6 +32,8 @@ NOT_IN_PROPORTION = ("s", "V")
 """Units of what shifts or cuts a signal: far from neutral it does not act in proportion; tried there too."""
 LIKELY = 2
 """Start values at which the further forms of an effect are looked at."""
+FORCES, MOMENTS = "N", "N m"
+"""Units of what an effect that is one or the other has on a linear and on a rotary axis."""
 POINT = 1e-2
 """Relative size of a step that is taken to be first order."""
 
@@ -68,9 +70,16 @@ def searchable(balance: ForceBalance) -> Iterator[type[Effect]]:
             yield kind
 
 
+def _own(kind: type[Effect], balance: ForceBalance) -> list[Parameter]:
+    """Return the parameters that an effect has on this axis: of a force and a moment only the one."""
+    turns = any(p.unit == MOMENTS for p in kind.parameters)
+    others = FORCES if turns and balance.stage.axis == "rotary" else MOMENTS
+    return [p for p in kind.parameters if p.unit != others]
+
+
 def _only_bias(kind: type[Effect], balance: ForceBalance) -> bool:
     """Tell whether a constant force is all that an effect can be on this axis."""
-    return kind.bias and (balance.stage.axis != "rotary" or len(kind.linear) < 2)
+    return kind.bias and len(_own(kind, balance)) < 2
 
 
 def _denied(balance: ForceBalance, number: str) -> bool:
@@ -148,8 +157,7 @@ def _alike(kind: type[Effect], entry: Entry, other: Entry) -> bool:
 
 def _points(kind: type[Effect], scales: Scales, fitter: Fitter) -> Iterator[tuple[Entry, str]]:
     """Go through entries at start values, and the linear parameter looked at ("" for the entry as is)."""
-    rotary = fitter.balance.stage.axis == "rotary"
-    own = [p for p in kind.parameters if rotary or p.unit != "N m"]
+    own = _own(kind, fitter.balance)
     for form in list(kind.forms) or [""]:
         base: Entry = {"name": kind.name, **({"form": form} if form else {})}
         base.update({p.name: ent.neutral(kind, p.name) for p in own if p.name in kind.linear})

@@ -58,15 +58,14 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         errors = [_by_cell(fitter, m, i if m is chosen else len(m.terms) - 1) for m in models]
         rows = _independent(fitter, chosen) / errors[0].size
         weight = probabilities(errors, rows, [m.size for m in models])
-        alike = confidence_set(errors, SET_LEVEL)
-        plainer = min(alike, key=lambda k: (models[k].size, -weight[k]))
+        least = (1.0 - ALIAS) * log_gain(rest.errors, chosen.errors)
+        members = {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
+        members |= set(confidence_set(errors, SET_LEVEL))
+        plainer = min(members, key=lambda k: (models[k].size, -weight[k]))
         if models[plainer].size < chosen.size and weight[plainer] > weight[0]:
             found.alternatives = [m for m in found.alternatives if m is not models[plainer]] + [chosen]
             found.chosen, found.beside, done = models[plainer], None, []
             continue
-        best_gain = log_gain(rest.errors, chosen.errors)
-        least = (1.0 - ALIAS) * best_gain
-        members = {*alike, *(k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least)}
         plainest = min(models[k].size for k in members)
         enough = max(weight[k] for k in members if models[k].size == plainest)
         members = {k for k in members if models[k].size == plainest or weight[k] > enough} | {0}

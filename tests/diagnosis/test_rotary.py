@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import pytest
 from recorded import STAGE, run, stage, there_and_back
 
+from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.baseline import baseline
+from rtcomp.diagnosis.candidates import candidates
+from rtcomp.diagnosis.data import load_data
+from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.stage.stage import Stage
 
@@ -19,3 +25,16 @@ def test_what_is_retuned_and_named_has_the_units_of_the_axis() -> None:
     units = {name: value.unit for name, value in named.parameters.items()}
     assert units.get("stiffness", "N m/rad") == "N m/rad"
     assert units.get("force", "N m") == "N m"
+
+
+@pytest.mark.parametrize(
+    ("axis", "own", "other"), [("linear", "force", "amplitude"), ("rotary", "amplitude", "force")]
+)
+def test_a_weight_is_a_force_on_a_linear_axis_and_a_moment_on_a_rotary_one(
+    axis: str, own: str, other: str
+) -> None:
+    believed = stage(axis=axis)
+    balance = ForceBalance(believed, load_data([run(believed, there_and_back(20.0))]))
+    fitted = baseline(balance)
+    made = [c.term.entry for c in candidates(Fitter(balance), fitted) if c.name == "gravity"]
+    assert made and all(own in entry and other not in entry for entry in made)

@@ -126,6 +126,18 @@ def test_an_effect_is_doubted_where_much_is_left_beside_it(bump: float, doubted:
     assert bool(doubts(fitter, chosen, noise)[0].why) == doubted
 
 
+def test_no_effect_is_doubted_for_what_makes_the_form_of_another_one() -> None:
+    wave = {"name": "cogging", "amplitude": 0.2, "period": 3e-4, "phase": 0.4}
+    second = {"name": "cogging", "amplitude": 0.15, "period": 1.5e-4, "phase": 1.4}
+    spring = {"name": "parallel-spring", "stiffness": 500.0}
+    truth = stage(effects=[wave, second, spring])
+    balance = ForceBalance(stage(), load_data([run(truth, there_and_back(20.0))]))
+    base, fitter = baseline(balance), Fitter(balance)
+    chosen = fitter.fit([Term.of(wave), Term.of(spring)], base)
+    noise = Null(np.ones(19), np.ones_like(chosen.errors) * np.linspace(0.9, 1.1, 19)[:, None])
+    assert [doubt.why for doubt in doubts(fitter, chosen, noise)] == ["", ""]
+
+
 @pytest.mark.parametrize(("first", "others"), [(3e-4, 1.5e-4), (1.5e-4, 3e-4)])
 def test_a_wave_is_not_doubted_for_what_makes_its_form_another(first: float, others: float) -> None:
     wave = {"name": "cogging", "amplitude": 0.2, "period": first, "phase": 0.4}
