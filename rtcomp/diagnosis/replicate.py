@@ -17,6 +17,7 @@ from rtcomp.diagnosis.data import Data, Segment, averaged
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics import Place, wires
 from rtcomp.physics.program import COUNT, Program, run_chain
+from rtcomp.stage.shoot import WIDER
 from rtcomp.stage.simulate import integrate, largest_step, largest_stiffness
 from rtcomp.stage.stage import Stage
 
@@ -84,8 +85,9 @@ def _simulated(
         target, command = _between(target, finer), _between(command, finer)
         command = 0.5 * (command + np.append(command[1:], command[-1:]))  # held from here to the next
     period = data.period / finer
-    steps = max(1, math.ceil(period / largest_step(stage) - 1e-9))
-    base = np.array([stage.mass, stage.force_constant, largest_stiffness(stage), 0.0])
+    stroke = WIDER * float(np.abs(motion).max())
+    steps = max(1, math.ceil(period / largest_step(stage, stroke) - 1e-9))
+    base = np.array([stage.mass, stage.force_constant, largest_stiffness(stage, stroke), 0.0])
     w = np.zeros(wires.COUNT)
     w[wires.MASS] = stage.mass
     w[wires.POSITION] = motion[0]

@@ -241,6 +241,10 @@ class Effect:
         """Largest stiffness (N/m) it can put on the mass; bounds the integration step."""
         return 0.0
 
+    def stiffness_within(self, stroke: float) -> float:
+        """Largest stiffness (N/m) within `stroke` (m) of position zero, where it grows with the position."""
+        return self.stiffness()
+
     def damping(self) -> float:
         """Largest damping (N s/m) it can put on the mass; bounds the integration step."""
         return 0.0

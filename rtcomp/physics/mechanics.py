@@ -87,7 +87,11 @@ class ParallelSpring(Effect):
 
     def stiffness(self) -> float:
         """Return the slope at 10 mm (10 mrad) from zero (N/m)."""
-        return abs(self.values["stiffness"]) + 3.0 * abs(self.values["cubic"]) * STROKE**2
+        return self.stiffness_within(STROKE)
+
+    def stiffness_within(self, stroke: float) -> float:
+        """Return the slope at `stroke` (m) from zero (N/m)."""
+        return abs(self.values["stiffness"]) + 3.0 * abs(self.values["cubic"]) * stroke**2
 
 
 @register

@@ -31,6 +31,9 @@ from rtcomp.physics.wires import (
 from rtcomp.stage.simulate import integrate, largest_step, largest_stiffness
 from rtcomp.stage.stage import Stage
 
+WIDER = 2.0
+"""Times as far as a recorded motion went, within which one simulated along it is taken to stay."""
+
 
 def shoot(
     stage: Stage,
@@ -54,8 +57,9 @@ def shoot(
         raise ValueError(f"windows of {rows} rows from {starts} do not lie within {time.size} rows")
     program = Program([e for e in stage.chain if e.place is not Place.SENSOR])
     period = float((time[-1] - time[0]) / max(time.size - 1, 1))
-    count = max(1, math.ceil(period / (coarse * largest_step(stage)) - 1e-9))
-    base = np.array([stage.mass, stage.force_constant, largest_stiffness(stage), 0.0])
+    stroke = WIDER * float(np.abs(position).max(initial=0.0))
+    count = max(1, math.ceil(period / (coarse * largest_step(stage, stroke)) - 1e-9))
+    base = np.array([stage.mass, stage.force_constant, largest_stiffness(stage, stroke), 0.0])
     motion = np.ascontiguousarray(np.column_stack([time, position, velocity, voltage]))
     out = np.empty((starts.size, rows))
     w = np.zeros(wires.COUNT)

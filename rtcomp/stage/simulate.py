@@ -178,14 +178,18 @@ def _sense(steps: np.ndarray, p: Floats, s: Floats, w: Floats) -> None:
     run_chain(steps, p, s, w, 0, steps[COUNT])
 
 
-def largest_stiffness(stage: Stage) -> float:
-    """Return the largest stiffness (N/m) that the whole chain can put on the mass."""
-    return sum(e.stiffness() + stage.mass * e.frequency() ** 2 for e in stage.chain)
+def largest_stiffness(stage: Stage, stroke: float | None = None) -> float:
+    """Return the largest stiffness (N/m) that the whole chain can put on the mass.
+
+    Where the axis is known to stay within `stroke` (m) of position zero, that there.
+    """
+    own = [e.stiffness() if stroke is None else e.stiffness_within(stroke) for e in stage.chain]
+    return sum(own) + sum(stage.mass * e.frequency() ** 2 for e in stage.chain)
 
 
-def largest_step(stage: Stage) -> float:
-    """Return the longest integration step (s) that resolves the stage's stiffness and damping."""
-    stiffness = largest_stiffness(stage)
+def largest_step(stage: Stage, stroke: float | None = None) -> float:
+    """Return the longest integration step (s) that resolves stiffness (within `stroke`, m) and damping."""
+    stiffness = largest_stiffness(stage, stroke)
     damping = sum(e.damping() + stage.mass * e.frequency() for e in stage.chain)
     step = min(1.0 / stage.rate, *(e.longest_step() for e in stage.chain))
     if stiffness > 0:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rtcomp.stage.shoot import shoot
-from rtcomp.stage.simulate import Simulator
+from rtcomp.stage.simulate import Simulator, largest_step, largest_stiffness
 from rtcomp.stage.stage import Stage
 
 PERIOD = 2e-3
@@ -81,3 +81,36 @@ def test_windows_outside_the_recording_are_refused(start, rows):
     time = np.arange(1500) * PERIOD
     with pytest.raises(ValueError, match="do not lie within"):
         shoot(PENDULUM, time, time, time, time, np.array([start]), rows)
+
+
+@pytest.mark.parametrize("size", [2e-4, 3e-3])
+def test_a_spring_that_stiffens_is_as_stiff_as_the_motion_makes_it(size: float) -> None:
+    """Steps follow the slope where the axis goes: as exact, and no more of them than that needs."""
+    cubic = {"name": "parallel-spring", "stiffness": 200.0, "cubic": 1e3 / size**2}
+    stage = Stage.from_dict(
+        {
+            "stage": {
+                "mass": 0.5,
+                "force_constant": 2.0,
+                "voltage_limit": 9.0,
+                "viscous": 4.0,
+                "effects": [cubic],
+            }
+        }
+    )
+    rows, row = 2000, 1e-3
+    time = np.arange(rows) * row
+    voltage = 600.0 * size * np.sin(30.0 * time) * np.sin(4.0 * time)
+    simulator = Simulator(stage, substeps=4)
+    position, velocity = np.empty(rows), np.empty(rows)
+    for k in range(rows):
+        position[k], velocity[k] = simulator.position, simulator.velocity
+        simulator.advance(float(voltage[k]), row)
+    far = float(np.abs(position).max())
+    assert 0.1 * size < far < 3.0 * size
+    starts = np.arange(0, 1800, 150)
+    found = shoot(stage, time, position, velocity, voltage, starts, 150)
+    truth = np.array([position[s : s + 150] for s in starts])
+    assert np.abs(found - truth).max() < 0.01 * far
+    assert largest_step(stage, 2.0 * far) >= largest_step(stage)
+    assert largest_stiffness(stage, far) == pytest.approx(200.0 + 3.0 * cubic["cubic"] * far**2)
