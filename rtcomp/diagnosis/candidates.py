@@ -33,7 +33,7 @@ NOT_IN_PROPORTION = ("s", "V")
 LIKELY = 2
 """Start values at which the further forms of an effect are looked at."""
 FORCES, MOMENTS = "N", "N m"
-"""Units of what an effect that is one or the other has on a linear and on a rotary axis."""
+"""Units of an effect that is a force on a linear axis and a moment on a rotary one."""
 POINT = 1e-2
 """Relative size of a step that is taken to be first order."""
 
@@ -71,7 +71,7 @@ def searchable(balance: ForceBalance) -> Iterator[type[Effect]]:
 
 
 def _own(kind: type[Effect], balance: ForceBalance) -> list[Parameter]:
-    """Return the parameters that an effect has on this axis: of a force and a moment only the one."""
+    """Return the parameters that an effect has on this axis: a force or a moment, not both."""
     turns = any(p.unit == MOMENTS for p in kind.parameters)
     others = FORCES if turns and balance.stage.axis == "rotary" else MOMENTS
     return [p for p in kind.parameters if p.unit != others]
@@ -79,7 +79,7 @@ def _own(kind: type[Effect], balance: ForceBalance) -> list[Parameter]:
 
 def _only_bias(kind: type[Effect], balance: ForceBalance) -> bool:
     """Tell whether a constant force is all that an effect can be on this axis."""
-    return kind.bias and len(_own(kind, balance)) < 2
+    return kind.bias and all(p.unit != MOMENTS for p in _own(kind, balance))
 
 
 def _denied(balance: ForceBalance, number: str) -> bool:

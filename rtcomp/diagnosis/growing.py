@@ -40,11 +40,20 @@ def grow(
     for term in behind.values():
         terms += _scanned(fitter, model, term, least, ends)
     found = fitted_in_time(fitter, model, terms, ends)
-    return [*found, *fitted_in_time(fitter, model, _in_better_form(fitter, model, found), ends)]
+    return [*found, *fitted_in_time(fitter, model, _in_better_form(fitter, found, ends), ends)]
 
 
-def _in_better_form(fitter: Fitter, model: Fitted, found: Sequence[Fitted]) -> list[Term]:
-    """Return the last terms that leave less in another form as they are: first order may not tell forms."""
+def _in_better_form(fitter: Fitter, found: Sequence[Fitted], ends: float) -> list[Term]:
+    """Return the last terms in another form, where that leaves less at the same values."""
+
+    def better_than(larger: Fitted, term: Term) -> bool:
+        if time.monotonic() > ends:
+            return False
+        try:
+            return fitter.quick([*larger.terms[:-1], term]) < larger.sse
+        except (ConfigError, np.linalg.LinAlgError):
+            return False
+
     better = []
     for larger in found:
         term = larger.terms[-1]
@@ -54,7 +63,7 @@ def _in_better_form(fitter: Fitter, model: Fitted, found: Sequence[Fitted]) -> l
                 continue
             others = [v for v in (kind.search_grid.get(p.name) or (p.low, p.high)) if v != term.entry[p.name]]
             made = [term.with_entry({**term.entry, p.name: value}) for value in others]
-            better += [one for one in made if fitter.quick([*larger.terms[:-1], one]) < larger.sse]
+            better += [one for one in made if better_than(larger, one)]
     return better
 
 

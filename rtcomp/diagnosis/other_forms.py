@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rtcomp.diagnosis.fit import Fitter
 
 OTHERS = (1 / 2, 1 / 3, 2.0, 2 / 3)
-"""Periods of what another form has beside its strongest wave, the first or second, over that of this one."""
+"""Periods of a wave's other harmonics, over the one that was found: the first or the second of them."""
 LONGER = 0.02
 """Step of the derivative by the period, in waves over the stroke: a period that was fitted without overtones
 is biased."""

@@ -181,7 +181,7 @@ def _sense(steps: np.ndarray, p: Floats, s: Floats, w: Floats) -> None:
 def largest_stiffness(stage: Stage, stroke: float | None = None) -> float:
     """Return the largest stiffness (N/m) that the whole chain can put on the mass.
 
-    Where the axis is known to stay within `stroke` (m) of position zero, that there.
+    With `stroke` (m), the largest within that distance of position zero.
     """
     own = [e.stiffness() if stroke is None else e.stiffness_within(stroke) for e in stage.chain]
     return sum(own) + sum(stage.mass * e.frequency() ** 2 for e in stage.chain)

@@ -10,6 +10,7 @@ from rtcomp.diagnosis.baseline import baseline
 from rtcomp.diagnosis.candidates import candidates
 from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.stage.stage import Stage
 
@@ -38,3 +39,6 @@ def test_a_weight_is_a_force_on_a_linear_axis_and_a_moment_on_a_rotary_one(
     fitted = baseline(balance)
     made = [c.term.entry for c in candidates(Fitter(balance), fitted) if c.name == "gravity"]
     assert made and all(own in entry and other not in entry for entry in made)
+    beside = Fitter(balance).fit([Term.of({"name": "constant-force", "force": 0.1})], fitted)
+    names = {c.name for c in candidates(Fitter(balance), beside, ["constant-force"])}
+    assert ("gravity" in names) == (axis == "rotary")
