@@ -215,7 +215,7 @@ class Trajectory(Fitter):
         """Return numbers and terms after Levenberg-Marquardt steps, and what they leave with the prior.
 
         `slopes` (p, n) along the numbers may be those of a model nearby. From step to step they are corrected
-        by what the step did (Broyden 1965, Math. Comp. 19(92)), and computed again where a step gains nothing.
+        by what the step did (Broyden 1965, Math. Comp. 19(92)), computed again where it gains nothing.
         """
         prior, use = self.belief.prior, self.use
         rest = self.residual(c, terms)
