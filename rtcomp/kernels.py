@@ -40,6 +40,14 @@ def compiled(function: F) -> F:
     return cast(F, njit(cache=True, nogil=True, error_model="numpy")(function))
 
 
+def summing(function: F) -> F:
+    """Compile as `compiled`, with terms of a sum added in any order: several at a time, where there are many.
+
+    A sum in the order written waits for each addition before the next.
+    """
+    return cast(F, njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc"})(function))
+
+
 class Kernel:
     """A compiled function with a C address; compiled when the address is first asked for."""
 

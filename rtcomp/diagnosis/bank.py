@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rtcomp.kernels import Floats, compiled
+from rtcomp.kernels import Floats, compiled, summing
 from rtcomp.physics import Effect
 from rtcomp.physics.closing import ClosingBranches
 from rtcomp.physics.maxwell_slip import MaxwellSlip, stretched
@@ -75,8 +75,8 @@ def units_along(
     before = [*sorted(drive, key=lambda e: (e.place, e.order)), *(e for e in chain if e.order < models)]
     after = [e for e in chain if e.order > models]
     bending = [e for e in after if e.name == ClosingBranches.name]
-    # One for the whole, and one for each element: the whole as it would be with a little more of that one.
-    bent = [e for e in bending for _ in range(1 + len(reaches))]
+    # One for the whole, and one for each element (or for their sum): the whole with a little more of that.
+    bent = [e for e in bending for _ in range(1 + (len(reaches) if sizes is None else 1))]
     after = [e for e in after if e.name != ClosingBranches.name]
     program = Program([*before, *units, *bent, *after])
     row = float((motion[-1, 0] - motion[0, 0]) / max(motion.shape[0] - 1, 1))
@@ -154,6 +154,7 @@ def _along(
     for i in range(count):
         level += weights[i] * reaches[i]
         stiffness += stiffer * weights[i]
+    level_asked = _total(times, reaches) if summed else 0.0
     here, last, held = np.zeros(mean.shape[1]), np.zeros(mean.shape[1]), np.empty(count)
     for k in range(motion.shape[0]):
         for j in range(1, parts + 1):
@@ -166,26 +167,55 @@ def _along(
                     w[FRICTION] = 0.0
                     run_chain(steps, p, s, w, first + i, first + i + 1)
                     here[i] = w[FRICTION]
-            _stretch(w[MOVED], w[REACH], w[SCALE], w[SOFTENS], reaches, deflection, held)
+            asked = 0.0
+            if summed and w[SOFTENS] == 0.0:  # nobody asks what each element holds
+                moved, longer = w[MOVED], w[REACH]
+                total, asked = _stretched_sums(moved, longer, reaches, deflection, weights, times)
+                total, asked = total * w[SCALE], asked * w[SCALE]
+            else:
+                _stretch(w[MOVED], w[REACH], w[SCALE], w[SOFTENS], reaches, deflection, held)
+                total = _total(weights, held) if whole else 0.0
+                asked = _total(times, held) if summed else 0.0
+            grown = 1.0
             if whole:
-                _whole(steps, p, s, w, then, bent, level, stiffness, weights, reaches, held)
+                # The whole is what the chain sees from here on, and at the next step.
+                w[GRIP], w[GRIP_LEVEL], w[GRIP_STIFFNESS] = total, level, stiffness
+                w[FRICTION] = total
+                if bent > 0 and level > 0.0 and summed:
+                    asked = _bent_sum(steps, p, s, w, then, total, level, asked, level_asked)
+                elif bent > 0 and level > 0.0:
+                    _bend(steps, p, s, w, then, total, level, weights, reaches, held)
+                grown = _grown(steps, p, s, w, then + bent)
             if summed:
-                here[SPEED_UNITS] = _total(times, held)
+                here[SPEED_UNITS] = grown * asked
             else:
                 for i in range(count):
-                    here[SPEED_UNITS + i] = held[i]
+                    here[SPEED_UNITS + i] = grown * held[i]
             if parts > 1:
                 _share_out(mean, here, last, k, j, parts)
         for i in range(out.shape[1]):
             out[k, i] = here[i]
 
 
-@compiled
+@summing
 def _total(times: Floats, held: Floats) -> float:
     total = 0.0
     for i in range(held.size):
         total += times[i] * held[i]
     return total
+
+
+@summing
+def _stretched_sums(
+    moved: float, longer: float, reaches: Floats, deflection: Floats, weights: Floats, times: Floats
+) -> tuple[float, float]:
+    """Move the stop elements on, and return the sums of their deflections by `weights` and by `times`."""
+    total = asked = 0.0
+    for i in range(reaches.size):
+        deflection[i] = stretched(deflection[i], moved, reaches[i] * longer)
+        total += weights[i] * deflection[i]
+        asked += times[i] * deflection[i]
+    return total, asked
 
 
 @compiled
@@ -203,32 +233,11 @@ def _stretch(
 
 
 @compiled
-def _whole(
-    steps: np.ndarray,
-    p: Floats,
-    s: Floats,
-    w: Floats,
-    first: int,
-    bent: int,
-    level: float,
-    stiffness: float,
-    weights: Floats,
-    reaches: Floats,
-    held: Floats,
-) -> None:
-    """Change the whole of friction by the effects from `first` on, and what each element holds of it."""
-    total = _total(weights, held)
-    # The whole is what the chain sees from here on, and at the next step.
-    w[GRIP], w[GRIP_LEVEL], w[GRIP_STIFFNESS] = total, level, stiffness
-    w[FRICTION] = total
-    if bent > 0 and level > 0.0:
-        _bend(steps, p, s, w, first, total, level, weights, reaches, held)
+def _grown(steps: np.ndarray, p: Floats, s: Floats, w: Floats, first: int) -> float:
+    """Return how many times larger the effects from `first` on make the whole of friction."""
     whole = w[FRICTION]
-    run_chain(steps, p, s, w, first + bent, steps[0])
-    if whole != 0.0 and w[FRICTION] != whole:
-        grown = w[FRICTION] / whole
-        for i in range(weights.size):
-            held[i] *= grown
+    run_chain(steps, p, s, w, first, steps[0])
+    return float(w[FRICTION] / whole) if whole != 0.0 else 1.0
 
 
 @compiled
@@ -290,3 +299,27 @@ def _bend(
     for i in range(count):  # what is missing of the whole is the rounding of these differences
         held[i] += rest * reaches[i] / level
     w[GRIP], w[GRIP_LEVEL], w[FRICTION] = whole, level, whole
+
+
+@compiled
+def _bent_sum(
+    steps: np.ndarray,
+    p: Floats,
+    s: Floats,
+    w: Floats,
+    first: int,
+    total: float,
+    level: float,
+    asked: float,
+    level_asked: float,
+) -> float:
+    """Return the sum of what `_bend` puts into elements, each so many times as is `asked` (N, at its level)."""
+    w[GRIP], w[GRIP_LEVEL], w[FRICTION] = total, level, total
+    run_chain(steps, p, s, w, first, first + 1)
+    whole = w[GRIP]
+    more = MORE * level / max(abs(level_asked), level)
+    w[GRIP], w[GRIP_LEVEL] = total + more * (asked - total), level + more * (level_asked - level)
+    run_chain(steps, p, s, w, first + 1, first + 2)
+    found = whole + (w[GRIP] - whole) / more
+    w[GRIP], w[GRIP_LEVEL], w[FRICTION] = whole, level, whole
+    return float(found)

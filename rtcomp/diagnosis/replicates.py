@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +24,19 @@ from rtcomp.kernels import Floats
 
 FEW, MORE = 6, 4
 """Replicates after which what is plain is settled; so many more at a time where it is not."""
+IN_FULL = 2
+"""Of the replicates drawn at a time, those that gain most, whose best candidates are fitted in full."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A replicate: its largest gain to first order, what that is in a full fit, and its errors (B,)."""
+
+    gain: float
+    errors: Floats
+    fit: Callable[[], float] | None = None
+    """Makes the full fit; None once that is done, or will not be."""
+    in_full: float | None = None
 
 
 def free_columns(fitted: Fitted) -> Floats:
@@ -40,8 +54,8 @@ def null_of(
 
     Replicates are drawn until it is plain whether `gain` and the error of the fit are beyond them: sequential
     Monte Carlo (Besag and Clifford 1991, Biometrika 78(2)). A model that cannot be kept on the recorded
-    motion is judged by surrogates of its residual instead. After the time `ends` (time.monotonic) gains are
-    those of first order.
+    motion is judged by surrogates of its residual instead. The largest gains are those of full fits, the
+    others in proportion; after the time `ends` (time.monotonic) all are those of first order.
     """
     balance = fitter.balance
     try:
@@ -54,7 +68,7 @@ def null_of(
     names = ent.names(fitted.entries)
     events = any(ent.happens_once(ent.kind_of(c.term.entry)) for c in screen.candidates)
 
-    def one(number: int) -> tuple[float, float, Floats] | None:
+    def one(number: int) -> Drawn | None:
         data = replicate(stage, balance.data, motion, noise, 1000 * seed + number)
         if data is None:
             return None
@@ -66,21 +80,25 @@ def null_of(
         if made:
             look = Screen(made, other.block, other.blocks, other.use)
             gains += zip(made, look.gains(free_columns(again), again.residual), strict=True)
-        scale = fitter.power / max(other.power, 1e-300)
-        gain, fully = largest(other, again, gains, ends)
-        return gain, fully, again.errors * scale
+        errors = again.errors * fitter.power / max(other.power, 1e-300)
+        candidate, screened = max(gains, key=lambda each: each[1].gain, default=(None, None))
+        if candidate is None or screened is None or screened.gain <= 0.0:
+            return Drawn(0.0, errors)
+        return Drawn(screened.gain, errors, lambda: gain_in_full(other, again, candidate, screened, ends))
 
-    found: list[tuple[float, float, Floats]] = []
+    found: list[Drawn] = []
     chance = np.zeros(0)
     first, last = 0, FEW
     while first < last:
-        found += [f for f in shared(one, range(first, last)) if f is not None]
+        found += _largest_in_full([d for d in shared(one, range(first, last)) if d is not None])
         if len(found) < FEW // 2:
             return _surrogates(fitter, fitted, screen, seed)
-        gains, fully, errors = (np.array(each) for each in zip(*found, strict=True))
-        chance = np.append(chance, _by_chance(fitted, screen, 1000 * seed + first, gains.size - chance.size))
-        some = gains > 0.0  # what a full fit adds to gains on replicates, it adds to those by chance
-        more = float(np.median(fully[some] / gains[some])) if np.any(some) else 1.0
+        errors = np.array([d.errors for d in found])
+        chance = np.append(chance, _by_chance(fitted, screen, 1000 * seed + first, len(found) - chance.size))
+        # What a full fit adds to the largest gains, it adds to the others, and to those by chance.
+        told = [d.in_full / d.gain for d in found if d.in_full is not None and d.gain > 0.0]
+        more = float(np.median(told)) if told else 1.0
+        fully = np.array([more * d.gain if d.in_full is None else d.in_full for d in found])
         null = Null(_mixed(fitted, fully, errors.sum(axis=1), more * chance), errors)
         if null.plain(gain, fitted.errors, LEVEL):
             break
@@ -88,21 +106,25 @@ def null_of(
     return null
 
 
-def largest(
-    fitter: Fitter, model: Fitted, gains: Sequence[tuple[Candidate, Screened]], ends: float = math.inf
-) -> tuple[float, float]:
-    """Return the largest of the gains beside a model, to first order and, before `ends`, in a full fit."""
-    if not gains:
-        return 0.0, 0.0
-    candidate, screened = max(gains, key=lambda one: one[1].gain)
-    gain = max(screened.gain, 0.0)
+def _largest_in_full(drawn: Sequence[Drawn]) -> list[Drawn]:
+    """Return replicates, the full fits of those that gain most done."""
+    order = sorted(drawn, key=lambda d: -d.gain)
+    fits = [d.fit for d in order[:IN_FULL] if d.fit is not None]
+    done = shared(lambda fit: fit(), fits) + [None] * (len(order) - len(fits))
+    return [replace(d, fit=None, in_full=each) for d, each in zip(order, done, strict=True)]
+
+
+def gain_in_full(
+    fitter: Fitter, model: Fitted, candidate: Candidate, screened: Screened, ends: float = math.inf
+) -> float:
+    """Return the gain of a candidate beside a model in a full fit, or, after `ends`, to first order."""
     if time.monotonic() > ends:
-        return gain, gain
+        return screened.gain
     try:
         larger = fitter.fit([*model.terms, started(candidate, screened.sizes)], model)
     except (ConfigError, np.linalg.LinAlgError):
-        return gain, gain
-    return gain, max(gain, log_gain(model.errors, larger.errors))
+        return screened.gain
+    return max(screened.gain, log_gain(model.errors, larger.errors))
 
 
 def _mixed(fitted: Fitted, gains: Floats, errors: Floats, by_chance: Floats) -> Floats:

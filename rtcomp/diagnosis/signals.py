@@ -224,8 +224,9 @@ class Signals:
             return [table @ whole_of_it for table in units(some=some, times=sizes[SPEED_UNITS:])]
 
         def by_load() -> list[Floats]:
-            pairs = zip(units(MORE), units(), strict=True)
-            return [(more - plain)[:, SPEED_UNITS:] @ held / MORE for more, plain in pairs]
+            some = held != 0.0
+            pairs = zip(units(MORE, some, held), units(0.0, some, held), strict=True)
+            return [(more - plain)[:, SPEED_UNITS] / MORE for more, plain in pairs]
 
         held = self.weights if weights is None else weights
         speed = self.stage.mechanics.micro_damping_speed

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from recorded import run, stage, there_and_back
 
+from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import baseline
 from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
+from rtcomp.physics import Place, catalogue
 
 CREEP = {"name": "creep", "fraction": 0.7, "time_constant": 0.15}
 
@@ -34,3 +36,27 @@ def test_a_strong_creep_is_fitted_from_anywhere(fitter: Fitter, start: float) ->
     assert creep["fraction"] / found.weights.sum() == pytest.approx(CREEP["fraction"] / stiffness, rel=0.1)
     true = fitter.balance.error(found.entries, found.coefficients, found.weights)
     assert np.sum(true[fitter.rows] ** 2) == pytest.approx(found.sse, rel=0.02)
+
+
+def _at_work() -> list[dict[str, object]]:
+    """Return entries that change friction, in every form and with every choice."""
+    found = []
+    for kind in catalogue.entries():
+        if kind.place is Place.FRICTION and kind.searchable:
+            base = {"name": kind.name, **kind.example}
+            forms = [{**base, "form": form} for form in kind.forms] or [base]
+            choices = [(p.name, value) for p in kind.parameters if p.choice for value in (0.0, 1.0)]
+            found += [{**e, name: value} for e in forms for name, value in choices] or forms
+    return found
+
+
+@pytest.mark.parametrize("entry", _at_work(), ids=lambda e: " ".join(map(str, e.values())))
+def test_columns_sum_up_to_the_error(fitter: Fitter, entry: dict[str, object]) -> None:
+    """What a model leaves open is made in one pass, without its columns; any of them show the same."""
+    b, base = fitter.balance, fitter.fit([])
+    c = base.coefficients * np.random.default_rng(1).uniform(0.8, 1.2, base.coefficients.size)
+    c = np.append(c, np.ones(len(ent.basis(entry)) if ent.adds_force(ent.kind_of(entry)) else 0))
+    at_hand = base.coefficients[b.friction]
+    summed = b.error([entry], c, at_hand)
+    system = b.system([entry], at_hand)
+    assert summed == pytest.approx(system.y - c @ system.columns, abs=1e-4 * np.abs(system.y).max())
