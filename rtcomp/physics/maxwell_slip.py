@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rtcomp.kernels import Floats, compiled, effect_kernel
+from rtcomp.kernels import Floats, compiled, effect_kernel, summing
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Parameter, Place
 from rtcomp.physics.lists import ListEffect
@@ -21,15 +21,25 @@ def stretched(deflection: float, moved: float, reach: float) -> float:
     return min(max(deflection + moved, -reach), reach)
 
 
+@summing
+def _held(p: Floats, s: Floats, count: int, moved: float, longer: float) -> float:
+    """Move `count` elements on, and return the force of their sum (N)."""
+    force = 0.0
+    for i in range(count):
+        s[i] = stretched(s[i], moved, p[1 + count + i] * longer)
+        force += p[1 + i] * s[i]
+    return force
+
+
 @effect_kernel
 def maxwell_slip(p: Floats, s: Floats, w: Floats) -> None:
-    """p: count, stiffness and reach of each element, level, whole stiffness; s: deflection (m) of each."""
-    force = 0.0
-    count = int(p[0])
-    for i in range(count):
-        reach = p[2 + 2 * i] * w[REACH]
-        s[i] = stretched(s[i], w[MOVED], reach)
-        force += p[1 + 2 * i] * softened(s[i], reach, w[SOFTENS])
+    """p: count, stiffnesses, reaches, level, whole stiffness; s: deflection (m) of each element."""
+    count, longer, softening = int(p[0]), w[REACH], w[SOFTENS]
+    force = _held(p, s, count, w[MOVED], longer)
+    if softening != 0.0:
+        force = 0.0
+        for i in range(count):
+            force += p[1 + i] * softened(s[i], p[1 + count + i] * longer, softening)
     w[GRIP] = force * w[SCALE]
     w[GRIP_LEVEL] = p[1 + 2 * count]
     w[GRIP_STIFFNESS] = p[2 + 2 * count]
@@ -56,8 +66,9 @@ class MaxwellSlip(ListEffect):
     searchable = False
 
     def vector(self) -> Floats:
-        """Return count, elements, level (N) and the stiffness with every element sticking (N/m)."""
-        return np.append(super().vector(), [self.level, sum(k for k, _ in self.elements)])
+        """Return count, stiffnesses, reaches, level (N) and the stiffness with every element sticking (N/m)."""
+        stiffness, reach = zip(*self.elements, strict=True)
+        return np.array([len(self.elements), *stiffness, *reach, self.level, sum(stiffness)])
 
     def initial_state(self) -> Floats:
         """Return the elements' deflections, all relaxed."""
