@@ -228,7 +228,7 @@ class ForceBalance(Signals):
         modifiers = [e for e in work if e.place is Place.FRICTION]
         bodies = [e for e in work if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
         forces_added = [ent.build(e) for e, adds in zip(everything, adding, strict=True) if adds]
-        side = Group(("y", key_of(drive), key_of(sensors)), lambda: self._drive_side(drive, sensors))
+        side = self._side(drive, sensors)
         base, by_load = self._base(drive, sensors, modifiers, bodies, forces_added, weights, stiffer)
         added = [
             [self._added(made, sensors) for made in ent.basis(e)] if adds else []
@@ -245,11 +245,16 @@ class ForceBalance(Signals):
         changing = [e for e in work if e.place is Place.FRICTION]
         return everything, adding, [*work, *(brought for e in changing for brought in e.companions())]
 
+    def _side(self, drive: Sequence[Effect], sensors: Sequence[Effect]) -> Group:
+        """Return the drive side; where nothing of it goes by the motion, that of the believed sensor."""
+        fixed = [e for e in self._fixed if e.place is Place.SENSOR]
+        own = [e for e in self.stage.chain if e.place is Place.DRIVE]
+        at = fixed if all(e.command_only for e in [*own, *drive]) else sensors
+        return Group(("y", key_of(drive), key_of(at)), lambda: self._drive_side(drive, at))
+
     def _plain_drive(self) -> Floats:
-        fixed = [e for e in self._fixed if e.place is Place.DRIVE]
-        sensors = [e for e in self._fixed if e.place is Place.SENSOR]
-        key = ("y", key_of(fixed), key_of(sensors))
-        found: Floats = self._whitened(Group(key, lambda: self._drive_side(fixed, sensors)))[0]
+        drive, sensors = ([e for e in self._fixed if e.place is p] for p in (Place.DRIVE, Place.SENSOR))
+        found: Floats = self._whitened(self._side(drive, sensors))[0]
         return found
 
     def _power(self, y: Floats) -> float:

@@ -313,7 +313,7 @@ def _bent_sum(
     asked: float,
     level_asked: float,
 ) -> float:
-    """Return the sum of what `_bend` puts into elements, each so many times as is `asked` (N, at its level)."""
+    """Return the sum of what `_bend` puts into elements, so many times each as make `asked` (N) unbent."""
     w[GRIP], w[GRIP_LEVEL], w[FRICTION] = total, level, total
     run_chain(steps, p, s, w, first, first + 1)
     whole = w[GRIP]

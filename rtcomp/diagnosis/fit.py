@@ -242,7 +242,7 @@ class Fitter:
         variance = sse / count
         weights = c[b.friction]
         free = free_of(current, b)
-        damping = 1e-3
+        damping, tangents = 1e-3, None
         for _ in range(steps if free else 0):
             tangents = self._tangents(current, free, system, c, weights)
             wide = prior.extended(np.full(len(free), -np.inf), np.full(len(free), np.inf))
@@ -266,7 +266,7 @@ class Fitter:
                 damping *= 10.0
             if not improved:
                 break
-            gained = 1.0 - found[-1] / sse
+            gained, tangents = 1.0 - found[-1] / sse, None
             current, made_for = trial, weights
             system, prior, _grams, c, sse = found
             weights = c[b.friction]
@@ -277,10 +277,12 @@ class Fitter:
                 break
         turns = TURNS if goes_by_whole(b, entries) else 0
         while turns > 0 and not consistent(b, made_for, weights):
-            made_for, turns = weights, turns - 1
+            made_for, turns, tangents = weights, turns - 1, None
             system, prior, _, c, sse = self.solve(current, made_for, variance, c)
             weights = c[b.friction]
-        done = self._finished(current, free, system, prior, c, sse, variance, weights)
+        if tangents is None:
+            tangents = self._tangents(current, free, system, c, weights)
+        done = self._finished(current, free, system, prior, c, tangents, sse, variance, weights)
         settled = not goes_by_whole(b, entries) or consistent(b, made_for, weights)
         return done if settled else self._as_it_is(done)
 
@@ -301,12 +303,12 @@ class Fitter:
         system: System,
         prior: Prior,
         c: Floats,
+        tangents: Floats,
         sse: float,
         variance: float,
         weights: Floats,
     ) -> Fitted:
         b = self.balance
-        tangents = self._tangents(terms, free, system, c, weights)
         wide = prior.extended(np.full(len(free), -np.inf), np.full(len(free), np.inf))
         joint = Grams.of(np.concatenate([system.columns, tangents]), system.y, b.block, b.blocks)
         whole = np.concatenate([c, np.zeros(len(free))])

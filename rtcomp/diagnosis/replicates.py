@@ -24,8 +24,8 @@ from rtcomp.kernels import Floats
 
 FEW, MORE = 6, 4
 """Replicates after which what is plain is settled; so many more at a time where it is not."""
-IN_FULL = 2
-"""Of the replicates drawn at a time, those that gain most, whose best candidates are fitted in full."""
+IN_FULL, STEPS = 2, 3
+"""Replicates of those drawn at a time, whose best candidates are fitted; the steps of such a fit."""
 
 
 @dataclass(frozen=True)
@@ -90,20 +90,32 @@ def null_of(
     chance = np.zeros(0)
     first, last = 0, FEW
     while first < last:
-        found += _largest_in_full([d for d in shared(one, range(first, last)) if d is not None])
-        if len(found) < FEW // 2:
+        drawn = [d for d in shared(one, range(first, last)) if d is not None]
+        if len(found) + len(drawn) < FEW // 2:
             return _surrogates(fitter, fitted, screen, seed)
-        errors = np.array([d.errors for d in found])
-        chance = np.append(chance, _by_chance(fitted, screen, 1000 * seed + first, len(found) - chance.size))
-        # What a full fit adds to the largest gains, it adds to the others, and to those by chance.
-        told = [d.in_full / d.gain for d in found if d.in_full is not None and d.gain > 0.0]
-        more = float(np.median(told)) if told else 1.0
-        fully = np.array([more * d.gain if d.in_full is None else d.in_full for d in found])
-        null = Null(_mixed(fitted, fully, errors.sum(axis=1), more * chance), errors)
+        chance = np.append(chance, _by_chance(fitted, screen, 1000 * seed + first, len(drawn)))
+        null = _null(fitted, [*found, *drawn], chance)
+        # Full fits gain more: what is chance beside less needs none.
+        if null.p_value(gain) < LEVEL or not null.plain(gain, fitted.errors, LEVEL):
+            drawn = _largest_in_full(drawn)
+            null = _null(fitted, [*found, *drawn], chance)
         if null.plain(gain, fitted.errors, LEVEL):
             break
+        found += drawn
         first, last = last, min(last + MORE, REPLICATES)
     return null
+
+
+def _null(fitted: Fitted, found: Sequence[Drawn], chance: Floats) -> Null:
+    """Return the null distribution of replicates `found` and of gains by `chance` (R,), to first order.
+
+    What a full fit adds to the largest gains, it adds to the others, and to those by chance.
+    """
+    told = [d.in_full / d.gain for d in found if d.in_full is not None and d.gain > 0.0]
+    more = float(np.median(told)) if told else 1.0
+    fully = np.array([more * d.gain if d.in_full is None else d.in_full for d in found])
+    errors = np.array([d.errors for d in found])
+    return Null(_mixed(fitted, fully, errors.sum(axis=1), more * chance), errors)
 
 
 def _largest_in_full(drawn: Sequence[Drawn]) -> list[Drawn]:
@@ -117,11 +129,11 @@ def _largest_in_full(drawn: Sequence[Drawn]) -> list[Drawn]:
 def gain_in_full(
     fitter: Fitter, model: Fitted, candidate: Candidate, screened: Screened, ends: float = math.inf
 ) -> float:
-    """Return the gain of a candidate beside a model in a full fit, or, after `ends`, to first order."""
+    """Return the gain of a candidate beside a model in a short fit, or, after `ends`, to first order."""
     if time.monotonic() > ends:
         return screened.gain
     try:
-        larger = fitter.fit([*model.terms, started(candidate, screened.sizes)], model)
+        larger = fitter.fit([*model.terms, started(candidate, screened.sizes)], model, STEPS)
     except (ConfigError, np.linalg.LinAlgError):
         return screened.gain
     return max(screened.gain, log_gain(model.errors, larger.errors))

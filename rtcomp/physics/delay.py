@@ -116,6 +116,7 @@ class DriveDelay(Effect):
     example = {"delay": 3.3e-3}
     neutral = {"delay": 0.0}
     linear = ("delay",)
+    command_only = True
     averages = True
     order = 20
     states = _RING + 2 * HELD

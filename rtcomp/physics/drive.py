@@ -152,6 +152,7 @@ class DriveOffset(Effect):
     neutral = {"offset": 0.0}
     linear = ("offset",)
     steady = True
+    command_only = True
     bias = True
     order = 10
 
@@ -174,6 +175,7 @@ class DriveDeadband(Effect):
     neutral = {"width": 0.0}
     linear = ("width",)
     steady = True
+    command_only = True
     order = 30
 
 
@@ -195,6 +197,7 @@ class DriveSaturation(Effect):
     example = {"limit": 0.9}
     neutral = {"limit": 1e6}
     steady = True
+    command_only = True
     order = 40
 
 
@@ -215,6 +218,7 @@ class DriveLag(Effect):
     example = {"time_constant": 5e-3}
     neutral = {"time_constant": 0.0}
     linear = ("time_constant",)
+    command_only = True
     order = 50
     states = 1
 
@@ -236,6 +240,7 @@ class DriveGain(Effect):
     neutral = {"gain": 1.0}
     linear = ("gain",)
     steady = True
+    command_only = True
     stands_for = "force_constant"
     order = 60
 
@@ -275,6 +280,7 @@ class DriveForce(Effect):
     example = {}
     searchable = False
     steady = True
+    command_only = True
     order = FORCE_ORDER
 
 

@@ -38,8 +38,8 @@ What modifies friction acts on every model of the catalogue through these wires:
 by MOVED only, speed by VELOCITY less LATE, its level by REACH, its size by SCALE, its curvature by SOFTENS.
 
 What a search for a missing effect needs to know stands here too, and nowhere by name: `linear` parameters,
-`neutral` values, `searchable`, `search_grid`, `whole_friction`, `moving_mass`, `behind`, `steady`, `bias`,
-`stands_for`,
+`neutral` values, `searchable`, `search_grid`, `whole_friction`, `moving_mass`, `behind`, `steady`,
+`command_only`, `bias`, `stands_for`,
 `Parameter.physical_low` and `Parameter.held`. Each has its sentence at `Effect`; the defaults do for most.
 
 To feed an effect forward, there are two ways, and its place says which:
@@ -178,6 +178,8 @@ class Effect:
     steady: ClassVar[bool] = False
     """Of the drive: whether its force stays as it is while the command is held. Forces beside the drive's,
     such as cogging's, do not count."""
+    command_only: ClassVar[bool] = False
+    """Of the drive: whether what it does depends on the command alone, wherever the axis is."""
     averages: ClassVar[bool] = False
     """Of the drive, where it remembers: whether what it gives over a step is the mean over that step."""
     bias: ClassVar[bool] = False

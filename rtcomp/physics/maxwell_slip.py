@@ -66,7 +66,7 @@ class MaxwellSlip(ListEffect):
     searchable = False
 
     def vector(self) -> Floats:
-        """Return count, stiffnesses, reaches, level (N) and the stiffness with every element sticking (N/m)."""
+        """Return count, stiffnesses, reaches, level (N) and the stiffness of all elements (N/m)."""
         stiffness, reach = zip(*self.elements, strict=True)
         return np.array([len(self.elements), *stiffness, *reach, self.level, sum(stiffness)])
 

@@ -36,10 +36,9 @@ from rtcomp.stage import lowpass
 from rtcomp.stage.sensed import true_position
 from rtcomp.stage.stage import Stage
 
-PARTS, MIDDLES = 32, 8
-"""Parts of a row over which the force of another drive is averaged: one that remembers, and one that goes by
-the motion alone, of which the middles of parts are taken. Of the first the mean is that of their ends, half a
-part late: at 8 the time constant of a lag came out a sixteenth of a row too large."""
+PARTS = 8
+"""Parts of a row over which the force of a drive is averaged: of one that remembers, their ends are taken, of
+one that goes by the motion alone, their middles."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ def forces(
     `position` is the true one; effects of the sensor are left out. `volts` is the command that was held up
     to each row. Motion there and back within `grain` (m) is noise. Rows are cut into `parts`, or more where
     an effect needs it; the drive's force is the mean over them (of their middles where nothing in the chain
-    remembers), the others are those at the row.
+    remembers, by the trapezoidal rule where it does), the others are those at the row.
     """
     program = Program([e for e in chain if e.place is not Place.SENSOR])
     out = np.zeros((8, time.size))
@@ -111,15 +110,19 @@ def forces(
     w[GRAIN] = grain
     parts = max(needed, parts)
     middle = parts > 1 and needed == 1 and program.s.size == 1  # a spare one: nothing remembers
-    _along(program.steps, program.p, program.s, w, base, motion, parts, needed > 1, middle, out)
+    ends = parts > 1 and _follows(chain)
+    _along(program.steps, program.p, program.s, w, base, motion, parts, needed > 1, middle, ends, out)
     return Forces(*out)
 
 
 def parts_of_drive(drive: Sequence[Effect]) -> int:
     """Return the parts of a row over which the force of `drive` is to be averaged."""
-    varying = [e for e in drive if not e.steady]
-    ends = any(e.states and not e.averages for e in drive)
-    return 1 if not varying else PARTS if ends else MIDDLES
+    return PARTS if any(not e.steady for e in drive) else 1
+
+
+def _follows(chain: Sequence[Effect]) -> bool:
+    """Tell whether the drive's force goes on from where it was, whatever the command does."""
+    return any(e.place is Place.DRIVE and e.states and not e.averages for e in chain)
 
 
 def parts_of(chain: Sequence[Effect], row: float) -> int:
@@ -160,20 +163,23 @@ def along_row(w: Floats, motion: Floats, k: int, j: float, parts: int) -> None:
 @compiled
 def _along(
     steps: np.ndarray, p: Floats, s: Floats, w: Floats, base: Floats, motion: Floats, parts: int, fast: bool,
-    middle: bool, out: Floats,
+    middle: bool, ends: bool, out: Floats,
 ) -> None:  # fmt: skip
     """Fill `out`: the mean of the drive's force over the row's parts, the rest as it is at the row's end.
 
     And the weighed means of the drive's force; of the others' where effects change so `fast`, within a row.
+    A part's drive force is that at its end or its middle, or the mean of both `ends`.
     """
-    last = 0.0
+    last = driven = 0.0
     for k in range(motion.shape[0]):
         drive = 0.0
         for j in range(1, parts + 1):
             along_row(w, motion, k, j - 0.5 if middle else float(j), parts)
             renew(w, base[0], base[1])
             run_chain(steps, p, s, w, 0, steps[0])
-            passed, force = (j - 0.5) / parts, w[DRIVE] / parts
+            before = driven if ends and k > 0 else w[DRIVE]
+            driven = w[DRIVE]
+            passed, force = (j - 0.5) / parts, 0.5 * (before + driven) / parts
             drive += force
             out[6, k] += force * passed
             out[7, k] += force * (1.0 - passed)

@@ -177,6 +177,18 @@ def test_a_steady_drive_keeps_its_force_while_the_command_is_held(entry):
 
 
 @every_form
+def test_what_goes_by_the_command_alone_is_told(entry):
+    if entry.place is not Place.DRIVE:
+        pytest.skip("is no drive")
+    still = SMOOTH.copy()
+    still[:, [POSITION, VELOCITY, ACCELERATION, MOVED]] = 0.0
+    moving, at_rest = (
+        over_rows(chain_of(example(entry)), rows)[:, [DRIVE, PUSH]] for rows in (SMOOTH, still)
+    )
+    assert np.array_equal(moving, at_rest) == entry.command_only
+
+
+@every_form
 def test_a_bias_is_the_same_force_everywhere(entry):
     change = signals(example(entry)) - signals()
     force = (
