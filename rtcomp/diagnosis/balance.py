@@ -16,13 +16,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.cache import KEPT_ONCE, Cache, Group
+from rtcomp.diagnosis.cache import KEPT_ONCE, Cache, Group, key_of
 from rtcomp.diagnosis.data import Data, Segment, reversals
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.noise import Noise, Whitening
 from rtcomp.diagnosis.reaches import MOST_OWN, joined
 from rtcomp.diagnosis.settings import BLOCK_REVERSALS, BLOCK_SECONDS, RESERVED_EVERY
-from rtcomp.diagnosis.signals import BASE, Signals, key_of
+from rtcomp.diagnosis.signals import BASE, Signals
 from rtcomp.diagnosis.spectrum import filtered, spectrum
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
@@ -229,9 +229,10 @@ class ForceBalance(Signals):
         bodies = [e for e in work if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
         forces_added = [ent.build(e) for e, adds in zip(everything, adding, strict=True) if adds]
         side = self._side(drive, sensors)
-        base, by_load = self._base(drive, sensors, modifiers, bodies, forces_added, weights, stiffer)
+        load = self._carried(bodies, forces_added, weights)
+        base, by_load = self._base(drive, sensors, modifiers, bodies, forces_added, load, weights, stiffer)
         added = [
-            [self._added(made, sensors) for made in ent.basis(e)] if adds else []
+            [self._added(made, sensors, load) for made in ent.basis(e)] if adds else []
             for e, adds in zip(everything, adding, strict=True)
         ]
         return side, base, added, by_load
@@ -254,8 +255,7 @@ class ForceBalance(Signals):
 
     def _plain_drive(self) -> Floats:
         drive, sensors = ([e for e in self._fixed if e.place is p] for p in (Place.DRIVE, Place.SENSOR))
-        found: Floats = self._whitened(self._side(drive, sensors))[0]
-        return found
+        return np.asarray(self._whitened(self._side(drive, sensors))[0])
 
     def _power(self, y: Floats) -> float:
         return float(np.sum(y[~self.reserved[self.block]] ** 2))
@@ -312,8 +312,7 @@ class ForceBalance(Signals):
 
     def drive_force(self) -> Floats:
         """Return the force of the believed drive (N, (n,)) below the motion's bandwidth."""
-        found: Floats = self._cache.of(("drive",), lambda: [self.both_sides(self.stage)[0]])[0]
-        return found
+        return np.asarray(self._cache.of(("drive",), lambda: [self.both_sides(self.stage)[0]])[0])
 
     def smooth(self, signals: Sequence[Floats]) -> Floats:
         """Return signals (K,), one a segment, below the motion's bandwidth on the compared rows, (n,)."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from rtcomp.kernels import Floats
+from rtcomp.physics import Effect
 
 KEPT, KEPT_ONCE = 2 * 10**8, 3 * 10**7
 """Bytes of columns that are kept for the next evaluation; those of a replicate, which is fitted once."""
@@ -60,3 +61,8 @@ class Group:
     """The sum of all columns times so many sizes, (K,) for each segment, where that is less work."""
     width: int = 0
     """Columns, where `times` is given."""
+
+
+def key_of(effects: Sequence[Effect]) -> Hashable:
+    """Return what tells effects with their values from others, whatever their order."""
+    return tuple(sorted(repr(e.to_dict()) for e in effects))

@@ -235,7 +235,7 @@ class Fitter:
         system, prior, grams, c, sse = self.solve(current, made_for, variance)
         variance = sse / count
         if by_weights(b, entries):
-            made_for = c[b.friction]
+            made_for, current = c[b.friction], self._sized(current, system, c)
             system, prior, grams = self._made(current, made_for, c)
         c = grams.solve(self.use, prior, variance)
         sse = float(grams.errors(c, self.use).sum())
@@ -252,7 +252,7 @@ class Fitter:
             for _ in range(4):
                 held = np.concatenate([wide.precision[: c.size], damping * power / max(variance, 1e-300)])
                 moved = joint.solve(self.use, Prior(wide.mean, held, wide.low, wide.high), variance)[c.size :]
-                trial = list(current)
+                trial = self._sized(current, system, c)
                 for f, step in zip(free, moved.tolist(), strict=True):
                     f.put(trial, f.get(current) + min(max(step, -f.most(current)), f.most(current)))
                 try:
@@ -313,15 +313,19 @@ class Fitter:
         joint = Grams.of(np.concatenate([system.columns, tangents]), system.y, b.block, b.blocks)
         whole = np.concatenate([c, np.zeros(len(free))])
         errors, without = left_out(joint, self.use, wide, variance, whole)
-        done = []
-        for term, span in zip(terms, system.of_entry[len(self._believed) :], strict=True):
-            sizes = c[span]
-            done.append(term.with_entry(ent.composed(term.entry, sizes)) if sizes.size else term)
         residual = system.y - c @ system.columns
         return Fitted(
-            tuple(done), c, system, prior, residual, tangents, tuple(free), errors, without, sse, variance,
-            weights,
+            tuple(self._sized(terms, system, c)), c, system, prior, residual, tangents, tuple(free), errors,
+            without, sse, variance, weights,
         )  # fmt: skip
+
+    def _sized(self, terms: Sequence[Term], system: System, c: Floats) -> list[Term]:
+        """Return terms with the sizes that coefficients `c` of their system give them."""
+        spans = system.of_entry[len(self._believed) :]
+        return [
+            term.with_entry(ent.composed(term.entry, c[span])) if span.stop > span.start else term
+            for term, span in zip(terms, spans, strict=True)
+        ]
 
     def _tangents(
         self, terms: list[Term], free: Sequence[Free], system: System, c: Floats, weights: Floats

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from rtcomp.diagnosis.cache import key_of
 from rtcomp.kernels import Floats, compiled
+from rtcomp.physics import Effect, wires
 from rtcomp.physics.coupled import contact
+from rtcomp.physics.program import COUNT, Program, run_chain
 
 FINE = 0.3
 """Longest sub-step (rad) of the load's oscillation behind a play."""
@@ -27,25 +31,55 @@ class Load:
     reaches: Floats
 
 
-def behind_play(x: Floats, period: float, gap: float, contact_hz: float, load: Load) -> Floats:
+@dataclass(frozen=True)
+class Carried:
+    """What is behind a play: friction as stiffnesses (N/m) of the units, and the other forces on the load."""
+
+    play: Effect
+    weights: Floats
+    pushes: tuple[Effect, ...]
+
+    @property
+    def key(self) -> Hashable:
+        """What tells it from others."""
+        return key_of([self.play]), self.weights.tobytes(), key_of(self.pushes)
+
+
+def behind_play(
+    x: Floats,
+    period: float,
+    gap: float,
+    contact_hz: float,
+    load: Load,
+    pushes: Sequence[Effect] = (),
+    start: float = 0.0,
+) -> Floats:
     """Return the position (m) of a load that `x` (m, rows of `period` s) drives through a play of +-`gap`.
 
-    The load's equation of motion, in sub-steps of its fastest oscillation: friction against the contact of
-    either end, which gives way and does not pull. Where neither end holds it, it stays, or flies on.
+    The load's equation of motion, in sub-steps of its fastest oscillation: friction and the forces `pushes`,
+    from the time `start` (s) on, against the contact of either end, which gives way and does not pull. Where
+    neither end holds it, it stays, or flies on.
     """
     omega = 2.0 * math.pi * contact_hz
-    held = math.sqrt(omega**2 + float(np.sum(load.stiffness)) / load.mass)
+    stroke = float(np.abs(x).max(initial=0.0)) + gap
+    stiffness = float(np.sum(load.stiffness)) + sum(e.stiffness_within(stroke) for e in pushes)
+    held = math.sqrt(omega**2 + stiffness / load.mass)
     parts = max(1, math.ceil(period * held / FINE))
+    program = Program(sorted(pushes, key=lambda e: (e.place, e.order)))
+    w = np.zeros(wires.COUNT)
+    w[wires.TIME] = start
+    w[wires.STEP] = period / parts
     return _drawn(
         x, period / parts, parts, gap, omega, load.mass, load.viscous, load.micro_damping, load.micro_speed,
-        load.stiffness, load.reaches,
+        load.stiffness, load.reaches, program.steps, program.p, program.s, w,
     )  # fmt: skip
 
 
 @compiled
 def _drawn(
     x: Floats, h: float, parts: int, gap: float, omega: float, mass: float, viscous: float, micro: float,
-    micro_speed: float, stiffness: Floats, reaches: Floats,
+    micro_speed: float, stiffness: Floats, reaches: Floats, steps: np.ndarray, p: Floats, s: Floats,
+    w: Floats,
 ) -> Floats:  # fmt: skip
     out = np.empty_like(x)
     z = np.zeros_like(reaches)
@@ -55,12 +89,18 @@ def _drawn(
         base = (x[k] - x[k - 1]) / (h * parts)
         for j in range(parts):
             at = x[k - 1] + base * j * h  # where the load is, too: speeds are half a step on
-            friction = 0.0
+            force = 0.0
             for i in range(z.size):
-                friction += stiffness[i] * z[i]
+                force -= stiffness[i] * z[i]
+            if steps[COUNT] > 0:
+                w[wires.POSITION], w[wires.VELOCITY], w[wires.MOVED] = y, u, h * u
+                w[wires.PUSH] = 0.0
+                run_chain(steps, p, s, w, 0, steps[COUNT])
+                force += w[wires.PUSH]
+                w[wires.TIME] += h
             ratio = u / micro_speed
             damping = viscous + micro * math.exp(-ratio * ratio)
-            u += h * (contact(y - at, u - base, gap, omega) - friction / mass)
+            u += h * (contact(y - at, u - base, gap, omega) + force / mass)
             u /= 1.0 + h * damping / mass
             for i in range(z.size):
                 z[i] = min(max(z[i] + h * u, -reaches[i]), reaches[i])

@@ -6,18 +6,18 @@ friction, drive, sensor or mass are at work while the other columns are made.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.bank import SPEED_UNITS, deflections, units_along
-from rtcomp.diagnosis.cache import Cache, Group
+from rtcomp.diagnosis.cache import Cache, Group, key_of
 from rtcomp.diagnosis.data import Data, Segment, behind_reading
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.noise import Noise
-from rtcomp.diagnosis.play import Load, behind_play
+from rtcomp.diagnosis.play import Carried, Load, behind_play
 from rtcomp.diagnosis.reaches import grid
 from rtcomp.diagnosis.spectrum import filtered
 from rtcomp.kernels import Floats
@@ -166,6 +166,7 @@ class Signals:
         modifiers: Sequence[Effect],
         bodies: Sequence[Effect],
         adding: Sequence[Effect],
+        carried: Carried | None,
         weights: Floats | None,
         stiffer: float,
     ) -> tuple[list[Group], Group | None]:
@@ -174,30 +175,30 @@ class Signals:
         The last is how much the friction at hand changes with the command, relative to it.
         """
         whole = any(e.whole_friction for e in modifiers)
-        play = next((e for e in bodies if e.behind and _active(e)), None)
-        hung = [e for e in bodies if not e.behind]
-        asked = weights is not None and (whole or play is not None)
-        own = (weights.tobytes(), stiffer) if weights is not None and asked else ()
+        hung = sorted((e for e in bodies if not e.behind), key=lambda e: (e.place, e.order))
+        coupled, pushing = ([e for e in hung if e.moving_mass == own] for own in (True, False))
+        own = (weights.tobytes(), stiffer) if weights is not None and whole else ()
         before: list[Effect] = []
         if any(e.values.get("external") is not None for e in modifiers):
             chain = [e for e in self.stage.chain if e.place is Place.DRIVE]
             before = [*chain, *[e for e in drive if e not in chain]]
             if any(e.values.get("external") for e in modifiers):
                 before += [e for e in adding if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
-        behind = ("load", key_of([play] if play else []), own if play is not None else ())
+        behind = carried.key if carried is not None else ()
+
+        def driven() -> list[Path]:
+            return self.driven(sensors, carried)
 
         def mass() -> list[Floats]:
             found = []
-            for k, (s, p) in enumerate(zip(self.data.segments, self.paths(sensors), strict=True)):
+            for s, p, load in zip(self.data.segments, self.paths(sensors), driven(), strict=True):
                 a = p.measured
-                if hung:
-                    f = forces(
-                        self.stage, sorted(hung, key=lambda e: e.order), s.time, p.x, p.v, p.a, s.voltage
-                    )
-                    a = (a * f.mass - around_rows(f.push)) / self.stage.mass
-                if play is not None:
-                    rest = _second_difference(self._load(sensors, play, weights)[k], self.data.rate)
-                    a = a + play.values["share"] * (rest - p.a)
+                for some, path in ((coupled, p), (pushing, load)):
+                    if some:
+                        f = forces(self.stage, some, s.time, path.x, path.v, path.a, s.voltage)
+                        a = (a * f.mass - around_rows(f.push)) / self.stage.mass
+                if carried is not None:
+                    a = a + carried.play.values["share"] * (load.a - p.a)
                 found.append(a)
             return found
 
@@ -205,12 +206,7 @@ class Signals:
             more: float = 0.0, some: np.ndarray | None = None, times: Floats | None = None
         ) -> list[Floats]:
             found = []
-            for k, (s, p) in enumerate(zip(self.data.segments, self.paths(sensors), strict=True)):
-                path = p
-                if play is not None:
-                    y = self._load(sensors, play, weights)[k]
-                    v = np.gradient(y, self.data.period)
-                    path = Path(y, v, _second_difference(y, self.data.rate), p.measured)
+            for s, path in zip(self.data.segments, driven(), strict=True):
                 pushed = replace(s, voltage=(1.0 + more) * s.voltage) if more else s
                 at_hand = weights if whole else None
                 found.append(self._units(pushed, path, before, modifiers, at_hand, some, times, stiffer))
@@ -238,15 +234,26 @@ class Signals:
         ]
         return columns, Group(("by load", held.tobytes(), *key), by_load) if before else None
 
-    def _load(self, sensors: Sequence[Effect], play: Effect, weights: Floats | None) -> list[Floats]:
-        """Return the position (m) of the load behind a play along each segment."""
-        held = self.weights if weights is None else weights
-        m = self.stage.mechanics
-        share, gap, contact = (play.values[k] for k in ("share", "gap", "contact"))
-        load = Load(share * m.mass, m.viscous, m.micro_damping, m.micro_damping_speed, held, self.reaches)
-        key = ("behind", key_of(sensors), key_of([play]), held.tobytes())
+    def driven(self, sensors: Sequence[Effect], carried: Carried | None) -> list[Path]:
+        """Return the motion of the load behind a play along each segment; without one, that of the axis."""
+        if carried is None:
+            return self.paths(sensors)
+        m, play, pushes = self.stage.mechanics, carried.play.values, carried.pushes
+        load = Load(
+            play["share"] * m.mass, m.viscous, m.micro_damping, m.micro_damping_speed, carried.weights,
+            self.reaches,
+        )  # fmt: skip
+
+        def path(s: Segment, p: Path) -> Path:
+            start = float(s.time[0])
+            y = behind_play(p.x, self.data.period, play["gap"], play["contact"], load, pushes, start)
+            return Path(
+                y, np.gradient(y, self.data.period), _second_difference(y, self.data.rate), p.measured
+            )
+
+        pairs = list(zip(self.data.segments, self.paths(sensors), strict=True))
         return self._cache.of(
-            key, lambda: [behind_play(p.x, self.data.period, gap, contact, load) for p in self.paths(sensors)]
+            ("driven", key_of(sensors), carried.key), lambda: [path(s, p) for s, p in pairs]
         )
 
     @property
@@ -292,15 +299,26 @@ class Signals:
         found: Floats = self._cache.of(key, lambda: [deflections(way, self.reaches)])[0]
         return found
 
-    def _added(self, entry: Entry, sensors: Sequence[Effect]) -> Group:
-        """Return the force that the motion needs for an entry that adds one."""
+    def _added(self, entry: Entry, sensors: Sequence[Effect], carried: Carried | None) -> Group:
+        """Return the force that the motion needs for an entry that adds one: behind a play, on the load."""
         effect = ent.build(entry)
+        load = carried if effect.place is not Place.DRIVE else None
 
         def made() -> list[Floats]:
-            pairs = zip(self.data.segments, self.paths(sensors), strict=True)
+            pairs = zip(self.data.segments, self.driven(sensors, load), strict=True)
             return [self._force_of(effect, s, p) for s, p in pairs]
 
-        return Group(("added", key_of([effect]), key_of(sensors)), made)
+        return Group(("added", key_of([effect]), key_of(sensors), load.key if load is not None else ()), made)
+
+    def _carried(
+        self, bodies: Sequence[Effect], adding: Sequence[Effect], weights: Floats | None
+    ) -> Carried | None:
+        """Return what is behind a play of `bodies`, None where there is none."""
+        play = next((e for e in bodies if e.behind and _active(e)), None)
+        pushes = [e for e in adding if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
+        pushes += [e for e in bodies if not e.behind and not e.moving_mass]
+        held = self.weights if weights is None else weights
+        return Carried(play, held, tuple(pushes)) if play is not None else None
 
 
 def _active(effect: Effect) -> bool:
@@ -322,8 +340,3 @@ def _second_difference(x: Floats, rate: float) -> Floats:
 
 def _all(frequency: Floats) -> Floats:
     return np.ones_like(frequency)
-
-
-def key_of(effects: Sequence[Effect]) -> Hashable:
-    """Return what tells effects with their values from others, whatever their order."""
-    return tuple(sorted(repr(e.to_dict()) for e in effects))

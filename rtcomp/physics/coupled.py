@@ -12,7 +12,7 @@ from typing import Final
 from rtcomp.kernels import Floats, compiled, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
-from rtcomp.physics.wires import BEHIND, FRICTION, MASS, MOVED, PUSH, STEP, VELOCITY
+from rtcomp.physics.wires import AHEAD, BEHIND, FRICTION, MASS, MOVED, PLAYED, POSITION, PUSH, STEP, VELOCITY
 
 LOAD_SHARE: Final = 0.6
 """Share of the moving mass that is behind the play, unless said otherwise."""
@@ -70,8 +70,8 @@ def contact(q: float, r: float, gap: float, omega: float) -> float:
 def backlash(p: Floats, s: Floats, w: Floats) -> None:
     """p: gap (m), share (1), contact (Hz); s: the load's place in the play (m), speed (m/s, from the ground).
 
-    Friction is a kick at the start of the step; free flight up to the contact and the contact are exact. A
-    contact that begins lasts to the end of the step. What runs after this sees the load's motion.
+    Forces on the load are a kick at the start of the step; free flight up to the contact and the contact are
+    exact. A contact that begins lasts to the end of the step. What runs after this sees the load's motion.
     """
     if p[0] <= 0.0:
         return
@@ -102,16 +102,19 @@ def backlash(p: Floats, s: Floats, w: Floats) -> None:
         w[MOVED] = 0.0
     # Between kicks the speed is a sawtooth; half of the next one gives its middle (Strang 1968).
     speed = s[1] - 0.5 * h * w[BEHIND] / mass
-    w[PUSH] -= mass * contact(s[0], speed - w[VELOCITY], p[0], omega)
-    w[VELOCITY] = speed
+    w[AHEAD] = w[PUSH] - mass * contact(s[0], speed - w[VELOCITY], p[0], omega)
+    w[PLAYED] = s[0]
+    w[POSITION] += s[0]
+    w[VELOCITY], w[PUSH] = speed, 0.0
 
 
 @effect_kernel
-def load_friction(p: Floats, s: Floats, w: Floats) -> None:
+def load_force(p: Floats, s: Floats, w: Floats) -> None:
     """p: gap (m)."""
     if p[0] > 0.0:
-        w[BEHIND] = w[FRICTION]
-        w[FRICTION] = 0.0
+        w[BEHIND] = w[FRICTION] - w[PUSH]
+        w[FRICTION], w[PUSH] = 0.0, w[AHEAD]
+        w[POSITION] -= w[PLAYED]
 
 
 @register
@@ -140,7 +143,7 @@ class Resonance(Effect):
     linear = ("mass_ratio",)
     search_grid = {"damping": (0.01, 0.05, 0.2), "mass_ratio": (0.1, 0.4)}
     moving_mass = True
-    order = 60
+    order = 20
     states = 2
 
     def frequency(self) -> float:
@@ -154,9 +157,10 @@ class Resonance(Effect):
 class Backlash(Effect):
     """Play of +-gap between the driven, measured mass and a load.
 
-    `share` of the moving mass and all friction are behind it, the sensor, springs and other forces before it;
-    the load meets either end as a mass on a spring, of the frequency `contact` and damping ratio 0.1, that
-    does not pull. It starts in the middle, at rest. `LoadFriction` closes it at the end of the chain.
+    `share` of the moving mass, friction, springs, weight and other forces are behind it, the drive and the
+    sensor before it; the load meets either end as a mass on a spring, of the frequency `contact` and damping
+    ratio 0.1, that does not pull. It starts in the middle, at rest. `LoadForce` closes it at the end of the
+    chain.
     """
 
     name = "backlash"
@@ -168,14 +172,14 @@ class Backlash(Effect):
     )
     kernel = backlash
     says = "play between drive and load: after a reversal the load stays behind, until it is met with a knock"
-    equation = "m_2 (x + q)'' = -k (|q| - gap)^+ sgn(q) - c q' in contact - friction"
+    equation = "m_2 (x + q)'' = -k (|q| - gap)^+ sgn(q) - c q' in contact - friction + other forces"
     source = "Nordin, Gutman (2002), Automatica 38(10), controlling mechanical systems with backlash"
     signature = "after each reversal friction and part of the inertia are missing over the same travel"
     experiment = "slow reversals, and strokes of several sizes around the play"
     example = {"gap": 2e-5}
     neutral = {"gap": 0.0}
     behind = True
-    order = 70
+    order = 30
     states = 2
 
     def frequency(self) -> float:
@@ -188,18 +192,18 @@ class Backlash(Effect):
         return FINEST / (2.0 * math.pi * self.values["contact"]) if self.values["gap"] > 0.0 else math.inf
 
     def companions(self) -> list[Effect]:
-        """Return what takes the friction from the mass and gives it to the load."""
-        return [LoadFriction(**self.values)]
+        """Return what takes the forces from the mass and gives them to the load."""
+        return [LoadForce(**self.values)]
 
 
-class LoadFriction(Effect):
-    """The end of a play's step: friction acts on the load. Not in the catalogue: `backlash` brings it."""
+class LoadForce(Effect):
+    """The end of a play's step: friction and other forces act on the load. Not in the catalogue."""
 
-    name = "load-friction"
+    name = "load-force"
     place = Place.FRICTION
     parameters = Backlash.parameters
-    kernel = load_friction
-    says = "friction acts on the load behind the play"
+    kernel = load_force
+    says = "friction and other forces act on the load behind the play"
     equation = "F_load <- F,  F <- 0"
     source = "Newton's third law"
     signature = "that of backlash"

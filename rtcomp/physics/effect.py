@@ -16,8 +16,9 @@ An effect may come in several `forms`: kernels of the same physics, with the sam
 entry says which (``form: level``), without it the first. Names of effects are names of families.
 
 Within a place, effects run by `order`, lowest first. The drive's orders stand in `drive`, the sensor's in
-`sensor`; mechanics: mass (10), then what adds forces (50), then second masses, which take from MASS what is
-left (60 resonance; 70 backlash, after which MOVED and VELOCITY are the load's). Friction::
+`sensor`; mechanics: mass (10), then second masses, which take from MASS what is left (20 resonance; 30
+backlash, after which POSITION, MOVED, VELOCITY and PUSH are the load's), then what adds forces (50).
+Friction::
 
      5  frictional-lag                  sets LATE, LATE_MIDWAY
     10  asymmetric-viscous-friction     sets SKEW
@@ -32,7 +33,7 @@ left (60 resonance; 70 backlash, after which MOVED and VELOCITY are the load's).
     50  models, bouc-wen, speed laws    add to FRICTION; a model leaves GRIP, GRIP_LEVEL, GRIP_STIFFNESS
     70  asymmetric-friction, closing    bends GRIP and exchanges it in FRICTION
     80  non-congruent-friction          bends GRIP and exchanges it in FRICTION (its first form)
-   100  (end of backlash)               FRICTION acts on the load behind the play: BEHIND
+   100  (end of backlash)               FRICTION and PUSH act on the load behind the play: BEHIND
 
 What modifies friction acts on every model of the catalogue through these wires: displacement reaches a model
 by MOVED only, speed by VELOCITY less LATE, its level by REACH, its size by SCALE, its curvature by SOFTENS.
@@ -71,8 +72,8 @@ class Place(enum.IntEnum):
     """Where in the chain an effect acts; the value is the order of evaluation."""
 
     DRIVE = 0
-    DISTURBANCE = 1
-    MECHANICS = 2
+    MECHANICS = 1
+    DISTURBANCE = 2
     FRICTION = 3
     SENSOR = 4
 
@@ -174,7 +175,7 @@ class Effect:
     moving_mass: ClassVar[bool] = False
     """Whether it sets the moving mass or couples part of it elastically: a share of the stage's own."""
     behind: ClassVar[bool] = False
-    """Whether friction and part of the mass are behind it, on a load with a motion of its own (a play)."""
+    """Whether part of the mass and the forces on it are behind it, with a motion of their own (a play)."""
     steady: ClassVar[bool] = False
     """Of the drive: whether its force stays as it is while the command is held. Forces beside the drive's,
     such as cogging's, do not count."""

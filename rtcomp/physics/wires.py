@@ -32,7 +32,7 @@ NOISE = 15  # 1, a fresh standard normal number for the sensor
 GRIP = 16  # N, force of the friction model after its last step, without damping
 GRIP_LEVEL = 17  # N, at which its sliding settles at REACH and SCALE 1
 GRIP_STIFFNESS = 18  # N/m, its slope at rest with everything sticking
-BEHIND = 19  # N, friction on the load behind a play after its last step
+BEHIND = 19  # N, friction on the load behind a play, less what pushes it, after its last step
 LATE = 20  # m/s, how far the speed that speed-dependent friction sees is behind
 SKEW = 21  # 1, speed-dependent friction is 1 + SKEW times larger forward, 1 - SKEW backward
 GRAIN = 22  # m, motion smaller than this is the sensor's noise; 0 in simulation
@@ -40,5 +40,7 @@ STIFFENS = 23  # 1, how much levels that change late stiffen what sticks: 0 they
 FOLLOWS = 24  # 1, how much what sticks follows such levels at once
 LATE_MIDWAY = 25  # m/s, LATE in the middle of the step
 SOFTENS = 26  # 1, how much steeper elements of the friction model are at rest, less steep where they yield
+AHEAD = 27  # N, other forces on the driven mass where there is a play: PUSH is then that on the load
+PLAYED = 28  # m, position of the load behind a play, from the driven mass
 
-COUNT = 27
+COUNT = 29

@@ -104,3 +104,18 @@ def test_how_the_load_meets_its_play_is_found_with_the_gap(gap: float) -> None:
     assert best["name"] == "backlash"
     for name in ("gap", "share", "contact"):
         assert best[name] == pytest.approx(soft[name], rel=0.1)
+
+
+def test_a_spring_and_a_weight_behind_a_play_are_fitted_with_it() -> None:
+    """Where the load lies in its play goes by all forces on it, those found with the play among them."""
+    spring, weight = {"name": "parallel-spring", "stiffness": 4e3}, {"name": "constant-force", "force": 0.9}
+    axis = Stage.from_dict({**STAGE, "stage": {**STAGE["stage"], "effects": [PLAY, spring, weight]}})
+    believed = Stage.from_dict({**STAGE, "stage": {**STAGE["stage"], "effects": [spring]}})
+    balance = ForceBalance(believed, load_data([run(axis, there_and_back(16.0))]))
+    fitter, base = Fitter(balance), baseline(balance)
+    right = fitter.fit([Term(PLAY, frozenset()), Term.of(weight)], steps=0)
+    begun = [Term.of({**PLAY, "gap": 3e-6}), Term.of({**weight, "force": 0.0})]
+    found = fitter.fit(begun)
+    assert found.entries[0]["gap"] == pytest.approx(PLAY["gap"], rel=0.05)
+    assert found.entries[1]["force"] == pytest.approx(weight["force"], rel=0.05)
+    assert right.sse < 1e-4 * base.sse and found.sse < 1e-3 * base.sse

@@ -13,6 +13,7 @@ from rtcomp.physics.rows import motion_rows, new_rows, over_rows
 from rtcomp.physics.wires import MASS, POSITION, PUSH
 from rtcomp.stage.simulate import Simulator, largest_step
 from rtcomp.stage.stage import Stage
+from rtcomp.trial.plant import Loop, Physics, simulate
 
 
 def stage(*effects, friction=None, **more):
@@ -116,3 +117,31 @@ def test_a_wrong_position_force_is_refused_with_its_place(entry, says, key):
         build({"name": "position-force", **entry})
     assert caught.value.key == key
     assert "\n" not in str(caught.value)
+
+
+def test_springs_weights_and_tones_act_on_the_load_behind_a_play():
+    """The trial's plant, which shares no physics with the program, moves alike, and not without the play."""
+    share, contact, gap = 0.6, 60.0, 4e-5
+    second = share * 2.0
+    k2 = second * (2.0 * np.pi * contact) ** 2
+    physics = Physics(2.0, 4.0, 10.0, 60.0, 0.0, 1.0, 1e-9, 1e-5, 1.0)._replace(
+        gap=gap, second_mass=second, second_stiffness=k2, second_damping=0.2 * np.sqrt(k2 * second),
+        spring=3e3, bias=0.8, tone=0.5, tone_frequency=3.1, tone_phase=0.4,
+    )  # fmt: skip
+    t = 1e-3 * np.arange(1500)
+    volts = 0.6 * np.sin(2 * np.pi * 1.3 * t) + 0.4 * np.sin(2 * np.pi * 2.9 * t)
+    other = simulate(physics, Loop(0.0, 0.0, 0.0, 1000.0, 0.0, 0.0, open=1.0), volts, 1).truth
+    behind = [
+        {"name": "parallel-spring", "stiffness": 3e3},
+        {"name": "constant-force", "force": 0.8},
+        {"name": "tonal-disturbance", "amplitude": 0.5, "frequency": 3.1, "phase": 0.4},
+    ]
+    play = {"name": "backlash", "gap": gap, "share": share, "contact": contact}
+    force = {"force_constant": 4.0, "viscous": 60.0}
+    off = {}
+    for what, effects in {"behind": [play, *behind], "no play": behind}.items():
+        simulator = Simulator(stage(*effects, **force), substeps=4.0)
+        out = np.append(0.0, run(simulator, volts)[:-1])
+        off[what] = np.sqrt(np.mean((out - other) ** 2) / np.mean(other**2))
+    print(off)
+    assert off["behind"] < 0.01 and off["no play"] > 0.05
