@@ -24,6 +24,8 @@ SETTLED_SPEED = 2e-3
 """Relative change of that speed at which it is settled."""
 FINER = 3
 """Times finer they stand around those found, in the second try."""
+SMOOTHED = (1.0, 0.1, 0.01)
+"""Parts of the noise (power) for which the position may be smoothed."""
 SLIGHT = 1e-3
 """Part of the friction level below which a unit is not needed."""
 
@@ -98,11 +100,25 @@ def with_offset(fitter: Fitter, fitted: Fitted) -> Fitted:
 
 
 def settle(fitter: Fitter, terms: Sequence[Term] = ()) -> None:
-    """Put friction's yield displacements and the speed of micro-damping to what a model of `terms` has."""
+    """Put yield displacements, smoothing and the speed of micro-damping to what a model of `terms` has."""
     if not fitter.gridded:
         return
     _put_grid(fitter, terms)
+    _smooth(fitter, terms)
     _damp(fitter, terms)
+
+
+def _smooth(fitter: Fitter, terms: Sequence[Term]) -> None:
+    """Smooth the position for as much of its noise as leaves least beside a model of `terms`.
+
+    Wiener's filter errs least on average. Friction that sticks is stiff, and what is smoothed away there is
+    missing from its force each time; noise is not. How much matters more depends on sensor and axis.
+    """
+    left = []
+    for part in SMOOTHED:
+        fitter.balance.smooth_for(part)
+        left.append(fitter.fit(terms, steps=0).sse)
+    fitter.balance.smooth_for(SMOOTHED[int(np.argmin(left))])
 
 
 def _put_grid(fitter: Fitter, terms: Sequence[Term]) -> None:

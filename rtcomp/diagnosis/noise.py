@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,7 +30,11 @@ class Noise:
     rms: float
     """m, white, at the recording's rate."""
     wiener: Response
-    """Share of the position's power that is signal, by frequency: Wiener's filter (1949)."""
+    """Share of the position's power that is signal, by frequency (Wiener 1949), up to where it is lost."""
+    signal: Response
+    """That share at all frequencies."""
+    smoother: Response
+    """What the position is smoothed by."""
     bandwidth: float
     """Hz, up to which signal is at least as strong as noise."""
 
@@ -47,13 +51,22 @@ class Noise:
         most = float(np.sqrt(density.min() * 0.5 * data.rate))
         rms = min(max(stated, 0.1 * most), most) if stated > 0.0 else most
         floor = rms**2 / (0.5 * data.rate)
-        share = np.maximum(1.0 - floor / density, 0.0)
-        # Once lost in noise, higher bands are only chance.
+        share = np.maximum(1.0 - floor / density, 1e-6)
+        signal = interpolated(frequency, share.copy())
+        # Once lost in noise, higher bands say nothing of a force.
         lost = np.flatnonzero(share < 0.5)
         last = int(lost[0]) if lost.size else share.size - 1
         share[last + 1 :] = np.minimum(share[last + 1 :], 1e-3)
-        share = np.maximum(share, 1e-6)
-        return cls(rms, interpolated(frequency, share), float(frequency[last]))
+        return cls(rms, interpolated(frequency, share), signal, signal, float(frequency[last]))
+
+    def smoothing_for(self, part: float) -> Noise:
+        """Return the same noise, the position smoothed as if only `part` of its power were there."""
+
+        def smoother(at: Floats) -> Floats:
+            share = self.signal(at)
+            return np.asarray(share / (share + part * (1.0 - share)))
+
+        return replace(self, smoother=smoother)
 
     @staticmethod
     def stated(stage: Stage) -> float:

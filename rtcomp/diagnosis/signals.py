@@ -33,6 +33,8 @@ FURTHEST = 0.3
 """Largest change of its logarithm that is taken from one fit."""
 PARTS = 2
 """Parts of a row for friction: where it turns within one, the force at its ends is not that between."""
+GRAINS = 1.5
+"""Motion there and back that is noise, in times the noise (rms) that smoothing leaves."""
 MORE = 1e-3
 """Relative change of the command to which that of friction is looked at."""
 
@@ -59,7 +61,7 @@ class Signals:
         self.stage, self.data = stage, data
         self.noise = noise or Noise.of(stage, data)
         share = min(1.0, self.noise.bandwidth / (0.5 * data.rate))
-        self.grain = 1.5 * self.noise.rms * float(np.sqrt(share))
+        self.grain = GRAINS * self.noise.rms * float(np.sqrt(share))
         self.coarse = grid(stage, data, self.grain)
         """Yield displacements (m) over all that the recording could show."""
         self.reaches = self.coarse
@@ -113,6 +115,13 @@ class Signals:
         named = any(k.stands_for == number and k.searchable for k in catalogue.entries())
         return stated == 0.0 and self.stage.friction is not None and named
 
+    def smooth_for(self, part: float) -> None:
+        """Smooth the position as if only `part` of its noise (power) were there."""
+        self.noise = self.noise.smoothing_for(part)
+        frequency = np.linspace(0.0, 0.5 * self.data.rate, 1000)
+        self.grain = GRAINS * self.noise.rms * float(np.sqrt(np.mean(self.noise.smoother(frequency) ** 2)))
+        self._cache = Cache()
+
     def damp_below(self, speed: float) -> None:
         """Take `speed` (m/s) as that below which micro-damping acts."""
         self.stage = self.stage.with_changes(stage={"micro_damping_speed": speed})
@@ -132,14 +141,14 @@ class Signals:
     def _path(self, segment: Segment, sensors: Sequence[Effect], *, smooth: bool = True) -> Path:
         rate = self.data.rate
         x = behind_reading(segment, sensors)
-        slow = filtered(x, rate, self.noise.wiener) if smooth else x
+        slow = filtered(x, rate, self.noise.smoother) if smooth else x
         if self.data.held:
             measured = _second_difference(x, rate)
-            v = filtered(x, rate, self.noise.wiener, derivative=True)
+            v = filtered(x, rate, self.noise.smoother, derivative=True)
         else:
             v = filtered(x, rate, _all, derivative=True)
             measured = around_rows(filtered(v, rate, _all, derivative=True))
-            v = filtered(v, rate, self.noise.wiener)
+            v = filtered(v, rate, self.noise.smoother)
         return Path(slow, v, _second_difference(slow, rate), measured)
 
     def _given(self, segment: Segment) -> Floats:
@@ -281,8 +290,7 @@ class Signals:
         With so many `times` each, their sum instead of them.
         """
         motion = np.column_stack([segment.time, path.x, path.v, path.a, self._given(segment)])
-        held, reaches = self.weights if weights is None else weights, self.reaches
-        start = self._start(segment)
+        held, reaches, start = self.weights if weights is None else weights, self.reaches, self._start(segment)
         if some is not None:
             held, reaches, start = held[some], reaches[some], start[some]
             times = times[some] if times is not None else None
