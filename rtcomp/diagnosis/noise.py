@@ -57,10 +57,16 @@ class Noise:
         lost = np.flatnonzero(share < 0.5)
         last = int(lost[0]) if lost.size else share.size - 1
         share[last + 1 :] = np.minimum(share[last + 1 :], 1e-3)
-        return cls(rms, interpolated(frequency, share), signal, signal, float(frequency[last]))
+        wiener = interpolated(frequency, share)
+        return cls(rms, wiener, signal, wiener, float(frequency[last]))
 
     def smoothing_for(self, part: float) -> Noise:
-        """Return the same noise, the position smoothed as if only `part` of its power were there."""
+        """Return the same noise, the position smoothed as if only `part` of its power were there.
+
+        For all of it what is lost in noise is left out; for less, nothing is.
+        """
+        if part >= 1.0:
+            return replace(self, smoother=self.wiener)
 
         def smoother(at: Floats) -> Floats:
             share = self.signal(at)

@@ -290,7 +290,11 @@ class Signals:
         With so many `times` each, their sum instead of them.
         """
         motion = np.column_stack([segment.time, path.x, path.v, path.a, self._given(segment)])
-        held, reaches, start = self.weights if weights is None else weights, self.reaches, self._start(segment)
+        held, reaches, start = (
+            self.weights if weights is None else weights,
+            self.reaches,
+            self._start(segment),
+        )
         if some is not None:
             held, reaches, start = held[some], reaches[some], start[some]
             times = times[some] if times is not None else None
