@@ -25,7 +25,7 @@ SETTLED_SPEED = 2e-3
 FINER = 3
 """Times finer they stand around those found, in the second try."""
 SMOOTHED = (1.0, 0.1, 0.01)
-"""Parts of the noise (power) for which the position may be smoothed."""
+"""Parts of the noise's power for which the position is smoothed: each is tried."""
 SLIGHT = 1e-3
 """Part of the friction level below which a unit is not needed."""
 
@@ -109,10 +109,10 @@ def settle(fitter: Fitter, terms: Sequence[Term] = ()) -> None:
 
 
 def _smooth(fitter: Fitter, terms: Sequence[Term]) -> None:
-    """Smooth the position for as much of its noise as leaves least beside a model of `terms`.
+    """Smooth the position for that part of its noise which leaves least beside a model of `terms`.
 
-    Wiener's filter errs least on average. Friction that sticks is stiff, and what is smoothed away there is
-    missing from its force each time; noise is not. How much matters more depends on sensor and axis.
+    Wiener's filter has the least error on average. Where friction sticks it is stiff, and motion that is
+    smoothed away there is missing from its force. Whether that or noise matters more depends on the axis.
     """
     left = []
     for part in SMOOTHED:

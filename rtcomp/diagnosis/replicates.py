@@ -95,7 +95,7 @@ def null_of(
             return _surrogates(fitter, fitted, screen, seed)
         chance = np.append(chance, _by_chance(fitted, screen, 1000 * seed + first, len(drawn)))
         null = _null(fitted, [*found, *drawn], chance)
-        # Full fits gain more: what is chance beside less needs none.
+        # Full fits gain more: where first order makes chance plain, none is needed.
         if null.p_value(gain) < LEVEL or not null.plain(gain, fitted.errors, LEVEL):
             drawn = _largest_in_full(drawn)
             null = _null(fitted, [*found, *drawn], chance)
@@ -107,9 +107,9 @@ def null_of(
 
 
 def _null(fitted: Fitted, found: Sequence[Drawn], chance: Floats) -> Null:
-    """Return the null distribution of replicates `found` and of gains by `chance` (R,), to first order.
+    """Return the null distribution of replicates `found` and of first-order gains by `chance`, (R,).
 
-    What a full fit adds to the largest gains, it adds to the others, and to those by chance.
+    What full fits add to the gains that have one, they add to the others, and to those by chance.
     """
     told = [d.in_full / d.gain for d in found if d.in_full is not None and d.gain > 0.0]
     more = float(np.median(told)) if told else 1.0

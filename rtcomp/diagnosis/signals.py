@@ -185,7 +185,7 @@ class Signals:
         """
         whole = any(e.whole_friction for e in modifiers)
         hung = sorted((e for e in bodies if not e.behind), key=lambda e: (e.place, e.order))
-        coupled, pushing = ([e for e in hung if e.moving_mass == own] for own in (True, False))
+        coupled, pushing = ([e for e in hung if e.moving_mass == so] for so in (True, False))
         own = (weights.tobytes(), stiffer) if weights is not None and whole else ()
         before: list[Effect] = []
         if any(e.values.get("external") is not None for e in modifiers):

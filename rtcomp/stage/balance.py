@@ -121,7 +121,7 @@ def parts_of_drive(drive: Sequence[Effect]) -> int:
 
 
 def _follows(chain: Sequence[Effect]) -> bool:
-    """Tell whether the drive's force goes on from where it was, whatever the command does."""
+    """Tell whether the drive's force is continuous where the command steps, as behind a lag."""
     return any(e.place is Place.DRIVE and e.states and not e.averages for e in chain)
 
 

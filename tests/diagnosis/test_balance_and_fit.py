@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recorded import RATE, changed, cut, run, stage, there_and_back
+from recorded import RATE, STAGE, changed, cut, run, stage, there_and_back
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import ForceBalance, reserved_blocks
@@ -29,6 +29,8 @@ from rtcomp.diagnosis.where import as_force
 from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.physics import Effect, catalogue
 from rtcomp.stage.balance import between_rows
+from rtcomp.stage.stage import Stage
+from rtcomp.trial.motion import draw_reference
 
 FORMS = [
     (kind, form)
@@ -250,3 +252,23 @@ def test_a_fit_stays_within_the_range_of_its_form() -> None:
         if term.entry["form"] == "elements":
             assert model.entries[0]["softening"] == pytest.approx(3.0, rel=0.02)
     assert {c.term.entry["form"] for c in made} == {"force", "elements"}
+
+
+def test_a_stiff_axis_is_smoothed_less_and_a_soft_one_by_wiener() -> None:
+    """What Wiener smooths away where a stiff axis sticks is three quarters of what a right model leaves."""
+    friction = [(6e5, 8e-7), (6e5, 2e-6), (5e5, 4e-6), (3e5, 7e-6)]
+    mechanics = {
+        "mass": 4.3, "force_constant": 5.0, "voltage_limit": 10.0, "viscous": 80.0, "micro_damping": 1100.0,
+        "micro_damping_speed": 1.4e-3, "friction": [{"stiffness": k, "reach": r} for k, r in friction],
+    }  # fmt: skip
+    controller = {"kp": 6e4, "ki": 6e5, "kd": 300.0}
+    stiff = Stage.from_dict({**STAGE, "stage": mechanics, "controller": controller})
+    motion = {"seconds": 20.0, "stroke": 6e-4, "reach": 9e-6, "fastest": 8.0}
+    reference = draw_reference(np.random.default_rng(2), 1000.0, **motion)
+    sse = {}
+    for axis, recording in ((stiff, run(stiff, reference)), (stage(), run(stage(), there_and_back(20.0)))):
+        balance = ForceBalance(axis, load_data([recording]))
+        least = baseline(balance).sse
+        balance.smooth_for(1.0)
+        sse[axis.mass] = least / Fitter(balance).fit([], steps=0).sse
+    assert sse[4.3] < 0.5 and sse[2.0] == pytest.approx(1.0)
