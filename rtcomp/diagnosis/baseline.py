@@ -11,7 +11,9 @@ from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.replicate import replicate
 from rtcomp.diagnosis.settings import LEAST_GAIN
+from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
 DENSE = 64
@@ -109,16 +111,28 @@ def settle(fitter: Fitter, terms: Sequence[Term] = ()) -> None:
 
 
 def _smooth(fitter: Fitter, terms: Sequence[Term]) -> None:
-    """Smooth the position for that part of its noise which leaves least beside a model of `terms`.
+    """Smooth the position for that part of its noise with which a model of `terms` fits a replicate best.
 
     Wiener's filter has the least error on average. Where friction sticks it is stiff, and motion that is
-    smoothed away there is missing from its force. Whether that or noise matters more depends on the axis.
+    smoothed away there is missing from its force. Whether that or noise matters more depends on the axis; a
+    replicate of the model tells it, for nothing is missing in that.
     """
+    balance = fitter.balance
+    balance.smooth_for(SMOOTHED[0])
+    model = fitter.fit(terms, steps=0)
+    try:
+        stage = fitter.stage(model, between=True)
+    except ConfigError:
+        return
+    data = replicate(stage, balance.data, [p.x for p in balance.paths()], balance.read_noise(stage), 0)
+    if data is None:
+        return
     left = []
     for part in SMOOTHED:
-        fitter.balance.smooth_for(part)
-        left.append(fitter.fit(terms, steps=0).sse)
-    fitter.balance.smooth_for(SMOOTHED[int(np.argmin(left))])
+        other = fitter.on(data)
+        other.balance.smooth_for(part)
+        left.append(other.fit(terms, model, steps=0).sse)
+    balance.smooth_for(SMOOTHED[int(np.argmin(left))])
 
 
 def _put_grid(fitter: Fitter, terms: Sequence[Term]) -> None:

@@ -14,7 +14,6 @@ from rtcomp.diagnosis.candidates import Candidate, candidates, started
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
-from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.replicate import replicate
 from rtcomp.diagnosis.screening import Screen, Screened
 from rtcomp.diagnosis.settings import LEVEL, REPLICATES
@@ -63,8 +62,7 @@ def null_of(
     except ConfigError:
         return _surrogates(fitter, fitted, screen, seed)
     motion = [p.x for p in balance.paths()]
-    recorded = balance.data.as_recorded()
-    noise = balance.noise.rms if balance.data.averaged == 1 else Noise.of(stage, recorded).rms
+    noise = balance.read_noise(stage)
     names = ent.names(fitted.entries)
     events = any(ent.happens_once(ent.kind_of(c.term.entry)) for c in screen.candidates)
 

@@ -7,7 +7,7 @@ friction, drive, sensor or mass are at work while the other columns are made.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from rtcomp.diagnosis.bank import SPEED_UNITS, deflections, units_along
 from rtcomp.diagnosis.cache import Cache, Group, key_of
 from rtcomp.diagnosis.data import Data, Segment, behind_reading
 from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.kinematics import Path, second_difference
 from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.play import Carried, Load, behind_play
 from rtcomp.diagnosis.reaches import grid
@@ -37,21 +38,6 @@ GRAINS = 1.5
 """Motion there and back that is noise, in times the noise (rms) that smoothing leaves."""
 MORE = 1e-3
 """Relative change of the command to which that of friction is looked at."""
-
-
-@dataclass(frozen=True)
-class Path:
-    """The motion behind a segment, all (K,): true position smoothed (m), velocity, acceleration of both."""
-
-    x: Floats
-    v: Floats
-    a: Floats
-    measured: Floats
-    """Acceleration (m/s^2) of the position as measured, as the balance compares it."""
-
-    def part(self, rows: slice) -> Path:
-        """Return some of its rows."""
-        return Path(self.x[rows], self.v[rows], self.a[rows], self.measured[rows])
 
 
 class Signals:
@@ -122,6 +108,10 @@ class Signals:
         self.grain = GRAINS * self.noise.rms * float(np.sqrt(np.mean(self.noise.smoother(frequency) ** 2)))
         self._cache = Cache()
 
+    def read_noise(self, stage: Stage) -> float:
+        """Return the noise (m rms) of a recorded reading, of which rows may be means."""
+        return self.noise.rms if self.data.averaged == 1 else Noise.of(stage, self.data.as_recorded()).rms
+
     def damp_below(self, speed: float) -> None:
         """Take `speed` (m/s) as that below which micro-damping acts."""
         self.stage = self.stage.with_changes(stage={"micro_damping_speed": speed})
@@ -143,13 +133,13 @@ class Signals:
         x = behind_reading(segment, sensors)
         slow = filtered(x, rate, self.noise.smoother) if smooth else x
         if self.data.held:
-            measured = _second_difference(x, rate)
+            measured = second_difference(x, rate)
             v = filtered(x, rate, self.noise.smoother, derivative=True)
         else:
             v = filtered(x, rate, _all, derivative=True)
             measured = around_rows(filtered(v, rate, _all, derivative=True))
             v = filtered(v, rate, self.noise.smoother)
-        return Path(slow, v, _second_difference(slow, rate), measured)
+        return Path(slow, v, second_difference(slow, rate), measured)
 
     def _given(self, segment: Segment) -> Floats:
         """Return the command (V, (K,)) that acts up to each row."""
@@ -256,9 +246,7 @@ class Signals:
         def path(s: Segment, p: Path) -> Path:
             start = float(s.time[0])
             y = behind_play(p.x, self.data.period, play["gap"], play["contact"], load, pushes, start)
-            return Path(
-                y, np.gradient(y, self.data.period), _second_difference(y, self.data.rate), p.measured
-            )
+            return Path(y, np.gradient(y, self.data.period), second_difference(y, self.data.rate), p.measured)
 
         pairs = list(zip(self.data.segments, self.paths(sensors), strict=True))
         return self._cache.of(
@@ -342,12 +330,6 @@ def _active(effect: Effect) -> bool:
 def _refitted(entry: Entry) -> bool:
     kind = ent.kind_of(entry)
     return ent.adds_force(kind) and bool(kind.linear)
-
-
-def _second_difference(x: Floats, rate: float) -> Floats:
-    a = np.zeros_like(x)
-    a[1:-1] = (x[2:] - 2.0 * x[1:-1] + x[:-2]) * rate**2
-    return a
 
 
 def _all(frequency: Floats) -> Floats:
