@@ -25,6 +25,8 @@ SET_LEVEL = 0.05
 """Level of the confidence set."""
 CELLS = 10
 """Parts of a block over which models are compared: each with many rows, together many."""
+DIGITS = 3
+"""Digits of a probability that a thousand draws tell: below them models are equally likely."""
 NEAR = 0.5
 """Part of the best screened gain from which on a candidate is fitted in another's place."""
 
@@ -69,7 +71,7 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         plainest = min(models[k].size for k in members)
         enough = max(weight[k] for k in members if models[k].size == plainest)
         members = {k for k in members if models[k].size == plainest or weight[k] > enough} | {0}
-        order = sorted(members, key=lambda k: (-weight[k], k))
+        order = sorted(members, key=lambda k: (-round(float(weight[k]), DIGITS), k))  # of equals the chosen
         names = [_replaced(models[k], chosen, i) for k in order]
         kept = [j for j, n in enumerate(names) if n not in names[:j]]
         gain = 1.0 - float(chosen.errors.sum() / rest.errors.sum())
