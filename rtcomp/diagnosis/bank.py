@@ -287,14 +287,11 @@ def _bend(
     `first` bends the whole, `total` (N) at `level` (N); those after it the whole with more of one element.
     """
     count = weights.size
-    w[GRIP], w[GRIP_LEVEL], w[FRICTION] = total, level, total
-    run_chain(steps, p, s, w, first, first + 1)
-    whole = rest = w[GRIP]
+    whole = rest = _bent(steps, p, s, w, first, total, level)
     for i in range(count):
         more = MORE * level / reaches[i]
-        w[GRIP], w[GRIP_LEVEL] = total + more * held[i], level + more * reaches[i]
-        run_chain(steps, p, s, w, first + 1 + i, first + 2 + i)
-        held[i] = (w[GRIP] - whole) / more
+        larger = _bent(steps, p, s, w, first + 1 + i, total + more * held[i], level + more * reaches[i])
+        held[i] = (larger - whole) / more
         rest -= weights[i] * held[i]
     for i in range(count):  # what is missing of the whole is the rounding of these differences
         held[i] += rest * reaches[i] / level
@@ -314,12 +311,17 @@ def _bent_sum(
     level_asked: float,
 ) -> float:
     """Return the sum of what `_bend` puts into elements, so many times each as make `asked` (N) unbent."""
-    w[GRIP], w[GRIP_LEVEL], w[FRICTION] = total, level, total
-    run_chain(steps, p, s, w, first, first + 1)
-    whole = w[GRIP]
+    whole = _bent(steps, p, s, w, first, total, level)
     more = MORE * level / max(abs(level_asked), level)
-    w[GRIP], w[GRIP_LEVEL] = total + more * (asked - total), level + more * (level_asked - level)
-    run_chain(steps, p, s, w, first + 1, first + 2)
-    found = whole + (w[GRIP] - whole) / more
+    other = total + more * (asked - total), level + more * (level_asked - level)
+    larger = _bent(steps, p, s, w, first + 1, other[0], other[1])
     w[GRIP], w[GRIP_LEVEL], w[FRICTION] = whole, level, whole
-    return float(found)
+    return float(whole + (larger - whole) / more)
+
+
+@compiled
+def _bent(steps: np.ndarray, p: Floats, s: Floats, w: Floats, at: int, force: float, level: float) -> float:
+    """Return a friction `force` (N) of this `level` (N) as the effect number `at` bends it."""
+    w[GRIP], w[GRIP_LEVEL], w[FRICTION] = force, level, force
+    run_chain(steps, p, s, w, at, at + 1)
+    return float(w[GRIP])

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis import starting
 from rtcomp.diagnosis.candidates import Candidate, candidates, started
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fit import Fitter
@@ -23,8 +24,8 @@ from rtcomp.kernels import Floats
 
 FEW, MORE = 6, 4
 """Replicates after which what is plain is settled; so many more at a time where it is not."""
-IN_FULL, STEPS = 2, 3
-"""Replicates of those drawn at a time, whose best candidates are fitted; the steps of such a fit."""
+IN_FULL = 2
+"""Number of replicates, of those drawn at a time, whose best candidate is fitted."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +132,7 @@ def gain_in_full(
     if time.monotonic() > ends:
         return screened.gain
     try:
-        larger = fitter.fit([*model.terms, started(candidate, screened.sizes)], model, STEPS)
+        larger = fitter.fit([*model.terms, started(candidate, screened.sizes)], model, starting.FEW)
     except (ConfigError, np.linalg.LinAlgError):
         return screened.gain
     return max(screened.gain, log_gain(model.errors, larger.errors))

@@ -174,8 +174,9 @@ class Signals:
         The last is how much the friction at hand changes with the command, relative to it.
         """
         whole = any(e.whole_friction for e in modifiers)
-        hung = sorted((e for e in bodies if not e.behind), key=lambda e: (e.place, e.order))
-        coupled, pushing = ([e for e in hung if e.moving_mass == so] for so in (True, False))
+        others = sorted((e for e in bodies if not e.behind), key=lambda e: (e.place, e.order))
+        second_masses = [e for e in others if e.moving_mass]
+        on_load = [e for e in others if not e.moving_mass]
         own = (weights.tobytes(), stiffer) if weights is not None and whole else ()
         before: list[Effect] = []
         if any(e.values.get("external") is not None for e in modifiers):
@@ -192,7 +193,7 @@ class Signals:
             found = []
             for s, p, load in zip(self.data.segments, self.paths(sensors), driven(), strict=True):
                 a = p.measured
-                for some, path in ((coupled, p), (pushing, load)):
+                for some, path in ((second_masses, p), (on_load, load)):
                     if some:
                         f = forces(self.stage, some, s.time, path.x, path.v, path.a, s.voltage)
                         a = (a * f.mass - around_rows(f.push)) / self.stage.mass
@@ -227,7 +228,7 @@ class Signals:
         speed = self.stage.mechanics.micro_damping_speed
         key = (key_of(before), key_of(modifiers), key_of(sensors), behind, own)
         columns = [
-            Group(("mass", key_of(hung), key_of(sensors), behind), mass),
+            Group(("mass", key_of(others), key_of(sensors), behind), mass),
             Group(("units", speed, *key), units, of_sizes, SPEED_UNITS + self.reaches.size),
             Group(("offset",), lambda: [np.ones(s.time.size) for s in self.data.segments]),
         ]

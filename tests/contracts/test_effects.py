@@ -177,7 +177,7 @@ def test_a_steady_drive_keeps_its_force_while_the_command_is_held(entry):
 
 
 @every_form
-def test_what_goes_by_the_command_alone_is_told(entry):
+def test_command_only_says_whether_a_drive_depends_on_the_motion(entry):
     if entry.place is not Place.DRIVE:
         pytest.skip("is no drive")
     still = SMOOTH.copy()
