@@ -8,6 +8,7 @@ import numpy as np
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
@@ -103,7 +104,7 @@ def with_offset(fitter: Fitter, fitted: Fitted) -> Fitted:
 
 def settle(fitter: Fitter, terms: Sequence[Term] = ()) -> None:
     """Put yield displacements, smoothing and the speed of micro-damping to what a model of `terms` has."""
-    if not fitter.gridded:
+    if not fitter.by_force:
         return
     _put_grid(fitter, terms)
     _smooth(fitter, terms)
@@ -127,11 +128,10 @@ def _smooth(fitter: Fitter, terms: Sequence[Term]) -> None:
     data = replicate(stage, balance.data, [p.x for p in balance.paths()], balance.read_noise(stage), 0)
     if data is None:
         return
-    left = []
-    for part in SMOOTHED:
-        other = fitter.on(data)
+    others = [fitter.on(data) for _ in SMOOTHED]
+    for other, part in zip(others, SMOOTHED, strict=True):
         other.balance.smooth_for(part)
-        left.append(other.fit(terms, model, steps=0).sse)
+    left = shared(lambda other: other.fit(terms, model, steps=0).sse, others)
     balance.smooth_for(SMOOTHED[int(np.argmin(left))])
 
 

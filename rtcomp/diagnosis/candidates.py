@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,6 +51,13 @@ class Candidate:
     """Bounds of the sizes, (q,) each."""
     solved: bool = False
     """Whether a fit solves for its sizes, wherever they begin."""
+    looked: str = ""
+    """The linear parameter that is looked at, where that is one of several."""
+
+    @property
+    def point(self) -> Hashable:
+        """What tells it from others, whatever it stands beside."""
+        return frozenset(self.term.entry.items()), self.looked
 
     @property
     def name(self) -> str:
@@ -93,11 +100,13 @@ def candidates(
     *,
     events: bool = False,
     ends: float = math.inf,
+    known: Sequence[Candidate] = (),
 ) -> list[Candidate]:
     """Return every candidate beside a fitted model, with the columns it would add to it.
 
     With `events`, those only that happen once, at a moment that the residual shows. Those not made until the
-    time `ends` (time.monotonic) are left out; every effect's first start comes before the others.
+    time `ends` (time.monotonic) are left out; every effect's first start comes before the others. What is
+    `known` beside a smaller model is taken from there: much the same to first order, where a fit only begins.
     """
     balance = fitter.balance
     scales = Scales.of(fitter, fitted)
@@ -108,9 +117,13 @@ def candidates(
         if k.name not in taken and not (offset and _only_bias(k, balance)) and ent.happens_once(k) >= events
     ]
     points = {k: list(_points(k, scales, fitter)) for k in kinds}
+    made = {c.point: c for c in known}
 
     def make(item: tuple[type[Effect], tuple[Entry, str]]) -> Candidate | None:
-        return None if time.monotonic() > ends else _candidate(fitter, fitted, *item)
+        before = made.get((frozenset(item[1][0].items()), item[1][1]))
+        if before is not None or time.monotonic() > ends:
+            return before
+        return _candidate(fitter, fitted, *item)
 
     # What changes nothing at its first point (friction, where there is none) is not tried at the others.
     first = shared(make, [(kind, found[0]) for kind, found in points.items() if found])
@@ -211,7 +224,8 @@ def _candidate(
         if fitter.linear(kind):
             parts = ent.basis(entry)
             columns = fitter.units([*fitted.entries, entry])
-            return _finite(Candidate(Term.of(entry), tuple(parts), columns, *ent.bounds_of(entry), True))
+            low, high = ent.bounds_of(entry)
+            return _finite(Candidate(Term.of(entry), tuple(parts), columns, low, high, True, linear))
         if not linear:
             change = fitter.change(fitted, entry)[None, :]
             return _finite(Candidate(Term.of(entry), (entry,), change, np.zeros(1), np.full(1, np.inf)))
@@ -233,7 +247,7 @@ def _candidate(
                 np.array([(most - entry[linear]) / step]),
             )
         columns = np.array([fitter.change(fitted, part) for part in parts])
-        return _finite(Candidate(term, tuple(parts), columns, low, high))
+        return _finite(Candidate(term, tuple(parts), columns, low, high, looked=linear))
     except ConfigError:
         return None
 

@@ -131,7 +131,8 @@ def _others(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -
     ]
     if known or time.monotonic() > ends:
         return known
-    made = candidates(fitter, rest, [*ent.names(rest.entries), str(name)])
+    beside = (found.beside or ()) if fitter.by_force else ()
+    made = candidates(fitter, rest, [*ent.names(rest.entries), str(name)], known=beside)
     screened = Screen(made, fitter.block, fitter.blocks, fitter.use).gains(free_columns(rest), rest.residual)
     least = NEAR * log_gain(rest.errors, chosen.errors)
     tried = [

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rtcomp.control.reference_settings import reference_settings
 from rtcomp.control.references import build_reference, check
+from rtcomp.diagnosis.replicate import followed
 from rtcomp.diagnosis.result import Experiment
 from rtcomp.diagnosis.view import View
 from rtcomp.errors import RtcompError
-from rtcomp.jobs.configuration import Configuration
-from rtcomp.jobs.simulate import on_reference
 from rtcomp.stage.stage import Stage
-from rtcomp.yamlfile import YamlFile
 
 SECONDS = 20.0
 
@@ -66,20 +63,14 @@ def next_experiment(one: Stage, other: Stage, names: tuple[str, str], motion: Vi
             check(reference, stroke=motion.stroke, acceleration=0.5 * strongest)
             t = np.arange(round(reference.duration * motion.rate)) / motion.rate
             path = reference.evaluate(t)[0]
-            runs = [_run(stage, path, motion) for stage in (one, other)]
+            (position, voltage), with_other = (followed(stage, path, motion.rate) for stage in (one, other))
         except RtcompError:
             continue
-        apart = float(np.sqrt(np.mean((runs[0]["position"] - runs[1]["position"]) ** 2))) / noise
-        apart += float(np.sqrt(np.mean((runs[0]["voltage"] - runs[1]["voltage"]) ** 2))) / quiet
-        if best is None or apart > best[0]:
+        apart = float(np.sqrt(np.mean((position - with_other[0]) ** 2))) / noise
+        apart += float(np.sqrt(np.mean((voltage - with_other[1]) ** 2))) / quiet
+        if np.isfinite(apart) and (best is None or apart > best[0]):
             best = (apart, says, section)
     if best is None:
         return None
     seconds = float(best[2].get("duration", SECONDS))
     return Experiment(best[2], names, seconds, best[1])
-
-
-def _run(stage: Stage, path: np.ndarray, motion: View) -> dict[str, np.ndarray]:
-    data = {**stage.to_dict(), "rate": motion.rate}
-    config = Configuration.of(YamlFile(data, Path("stage")))
-    return on_reference(config, path, float(path[0])).columns

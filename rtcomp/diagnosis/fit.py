@@ -46,8 +46,8 @@ TURNS = 6
 class Fitter:
     """One objective, here the force balance: what a model leaves of it, and fits of models to it."""
 
-    gridded = True
-    """Whether friction is a grid of units, which are put to where a model has it."""
+    by_force = True
+    """Whether forces are balanced: friction is a grid of units, and what effects change adds up."""
 
     def __init__(self, balance: ForceBalance) -> None:
         self.balance = balance
@@ -223,11 +223,8 @@ class Fitter:
         b = self.balance
         current = list(terms)
         weights = b.weights
-        if (
-            start is not None
-            and start.weights.size == b.reaches.size
-            and not newly_behind(terms, start.terms)
-        ):
+        alike = start is not None and start.weights.size == b.reaches.size
+        if start is not None and alike and not newly_behind(terms, start.terms):
             weights = start.weights
         count = max(int(self.rows.sum()), 1)
         variance = 1.0 if start is None else start.variance
@@ -251,7 +248,10 @@ class Fitter:
             improved = False
             for _ in range(4):
                 held = np.concatenate([wide.precision[: c.size], damping * power / max(variance, 1e-300)])
-                moved = joint.solve(self.use, Prior(wide.mean, held, wide.low, wide.high), variance)[c.size :]
+                whole = joint.solve(self.use, Prior(wide.mean, held, wide.low, wide.high), variance)
+                if joint.errors(whole, self.use).sum() > (1.0 - SETTLED) * sse:
+                    break  # no step is expected to gain anything
+                moved = whole[c.size :]
                 trial = self._sized(current, system, c)
                 for f, step in zip(free, moved.tolist(), strict=True):
                     f.put(trial, f.get(current) + min(max(step, -f.most(current)), f.most(current)))

@@ -35,7 +35,7 @@ def grow(
     least = min([*gains.values()][:FULL_FITS], default=0.0)
     terms = fitter.rough(model, list(families.values()), FULL_FITS, ends)
     # First order is no guide to what is behind a play: its own motion is followed from place to place.
-    behind = {c.name: c.term for c in made if fitter.gridded and ent.kind_of(c.term.entry).behind}
+    behind = {c.name: c.term for c in made if fitter.by_force and ent.kind_of(c.term.entry).behind}
     terms = [t for t in terms if t.entry["name"] not in behind]
     for term in behind.values():
         terms += _scanned(fitter, model, term, least, ends)

@@ -186,7 +186,7 @@ def numbers(fitter: Fitter, believed: Stage, fitted: Fitted, *, effects: bool = 
 def _of_the_balance(fitter: Fitter, fitted: Fitted, values: Floats) -> Floats:
     """Return by how much each number could be another for a part of the force, (q,); nothing of a reach."""
     found = np.zeros(values.size)
-    if not fitter.gridded:
+    if not fitter.by_force:
         return found
     columns, rows, level = fitted.system.columns, fitter.rows, len(BASE)
     friction = fitted.coefficients[fitter.balance.friction] @ columns[fitter.balance.friction]

@@ -12,6 +12,7 @@ from rtcomp.diagnosis.answer import answer
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import baseline, settle, with_offset
 from rtcomp.diagnosis.confidence import alternatives
+from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
@@ -20,7 +21,7 @@ from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.result import Diagnosis, Place
 from rtcomp.diagnosis.selection import LOOKED, Look, Search, look, search, until
 from rtcomp.diagnosis.settings import BUDGET
-from rtcomp.diagnosis.sticking import MUCH, part_untold
+from rtcomp.diagnosis.sticking import hides, part_untold
 from rtcomp.diagnosis.trajectory import Trajectory
 from rtcomp.diagnosis.validation import Reserved
 from rtcomp.diagnosis.where import Compared, as_force
@@ -87,7 +88,7 @@ def _diagnosed(
         located(left, locate(view, before, None, seed, stage.axis))
     say(1.0, "balance")
     untold = part_untold(stage, recordings)
-    if untold > MUCH and _loud(balance):
+    if hides(untold, _noise(balance), objectives[0].fitter.relative(base)):
         objectives = [_by_trajectory(stage, objectives[0])]
     fitter, found = _searched(objectives, ends - (1.0 - SEARCH) * budget, say, seed)
     say(0.0, "tell apart")
@@ -103,10 +104,10 @@ def _diagnosed(
     return replace(done, notes=[*notes, *done.notes], not_tried=found.not_tried)
 
 
-def _loud(balance: ForceBalance) -> bool:
-    """Tell whether noise alone leaves so much force that it is no judge of an axis that sticks unseen."""
+def _noise(balance: ForceBalance) -> float:
+    """Return the part of the drive's force (rms) that noise alone leaves."""
     rows = ~balance.reserved[balance.block]
-    return balance.noise_power > MUCH**2 * float(np.mean(balance.drive_force()[rows] ** 2))
+    return float(np.sqrt(balance.noise_power / np.mean(balance.drive_force()[rows] ** 2)))
 
 
 def _by_trajectory(stage: Stage, by_force: Objective) -> Objective:
@@ -140,14 +141,15 @@ def _objectives(
     """
     looped = all(r.reference is not None for r in recordings)
     ways = ([True] if looped else [True, False]) if held is None else [held]
-    made = []
-    for way in ways:
-        data = load_data(recordings, held=way)
-        bandwidth = Noise.of(stage, data).bandwidth
+
+    def objective(way: bool) -> Objective:
+        bandwidth = Noise.of(stage, load_data(recordings, held=way)).bandwidth
         balance = ForceBalance(stage, load_data(recordings, held=way, bandwidth=bandwidth))
         base = baseline(balance)
         fitter = Fitter(balance)
-        made.append(Objective(fitter, with_offset(fitter, base)))
+        return Objective(fitter, with_offset(fitter, base))
+
+    made = shared(objective, ways)
     if len(made) == 1:
         return made
     shares = (0.5 * LOOKED, LOOKED / (2.0 - LOOKED))  # of what is left each time: as long for both

@@ -56,6 +56,12 @@ def replicate(stage: Stage, data: Data, motion: list[Floats], noise: float, seed
     return replace(data, segments=tuple(made))
 
 
+def followed(stage: Stage, path: Floats, rate: float) -> tuple[Floats, Floats]:
+    """Return what a stage with a controller reads (m) and commands (V) along a path (m, (K,)), a row each."""
+    segment = Segment(np.arange(path.size) / rate, path, np.zeros(path.size), path)
+    return _simulated(stage, Data((segment,), rate, True), segment, path, np.random.default_rng(0))
+
+
 def _gains(stage: Stage, period: float, rate: float) -> Floats:
     controller = stage.controller
     if controller is not None:

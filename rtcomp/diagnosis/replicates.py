@@ -24,8 +24,8 @@ from rtcomp.kernels import Floats
 
 FEW, MORE = 6, 4
 """Replicates after which what is plain is settled; so many more at a time where it is not."""
-IN_FULL = 2
-"""Number of replicates, of those drawn at a time, whose best candidate is fitted."""
+IN_FULL = 3
+"""One of so many replicates drawn at a time is fitted with its best candidate: those with the largest."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def _null(fitted: Fitted, found: Sequence[Drawn], chance: Floats) -> Null:
 def _largest_in_full(drawn: Sequence[Drawn]) -> list[Drawn]:
     """Return replicates, the full fits of those that gain most done."""
     order = sorted(drawn, key=lambda d: -d.gain)
-    fits = [d.fit for d in order[:IN_FULL] if d.fit is not None]
+    fits = [d.fit for d in order[: len(order) // IN_FULL] if d.fit is not None]
     done = shared(lambda fit: fit(), fits) + [None] * (len(order) - len(fits))
     return [replace(d, fit=None, in_full=each) for d, each in zip(order, done, strict=True)]
 

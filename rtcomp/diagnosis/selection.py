@@ -11,6 +11,7 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.acceptance import accepted, doubts, exhausted, pruned, score
 from rtcomp.diagnosis.baseline import settle
 from rtcomp.diagnosis.candidates import Candidate, candidates
+from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
@@ -78,7 +79,8 @@ def search(
         while beam and judged is None:
             late = step > 0 and time.monotonic() > ends
             at_hand = first if step == 0 else None
-            seen = _judged(fitter, beam[0], seed + step, say, at_hand, until(ends, LOOKED), late=late)
+            known = found.beside if fitter.by_force else None
+            seen = _judged(fitter, beam[0], seed + step, say, at_hand, known, until(ends, LOOKED), late=late)
             judged = _sound(seen, parents[id(beam[0])])
             if judged is None:
                 beam.pop(0)
@@ -145,9 +147,19 @@ def _grown(
         if 2.0 * moment - began > ends:
             return grown, True
         began = moment
-        beside = look(fitter, other, ends)
-        grown += grow(fitter, other, beside.candidates, beside.screened, ends)
+        grown += grow(fitter, other, *_beside(other, seen), ends)
     return grown, time.monotonic() > ends
+
+
+def _beside(other: Fitted, seen: Look) -> tuple[list[Candidate], list[Screened]]:
+    """Return the candidates that were `seen` beside another model of equal size, and their gains beside this.
+
+    What an effect changes is much the same beside either; where it begins to be fitted is all that is needed.
+    """
+    own = ent.names(other.entries)
+    gains = seen.screen.gains(free_columns(other), other.residual)
+    pairs = [pair for pair in zip(seen.candidates, gains, strict=True) if pair[0].name not in own]
+    return [candidate for candidate, _ in pairs], [gain for _, gain in pairs]
 
 
 def _better(fitter: Fitter, model: Fitted, chosen: Fitted, null: Null, everything: float) -> bool:
@@ -201,7 +213,7 @@ def _settled_on_chosen(fitter: Fitter, found: Search) -> None:
     settle(fitter, found.chosen.terms)
     found.baseline = fitter.fit([])
     found.chosen = fitter.fit(found.chosen.terms, found.chosen)
-    found.alternatives = [fitter.fit(g.terms, g) for g in found.alternatives]
+    found.alternatives = _refitted(fitter, found.alternatives)
 
 
 def _resettled(
@@ -223,11 +235,16 @@ def _resettled(
         settle(fitter, best.terms)
         best = fitter.fit(best.terms, best)
     found.baseline = fitter.fit([])
-    again = [best, *(fitter.fit(m.terms, m) for m in beam[1:])]
+    again = [best, *_refitted(fitter, beam[1:])]
     parents.update({id(new): parents[id(old)] for new, old in zip(again, beam, strict=True)})
     near = [g for g in sorted(grown, key=score) if all(g is not m for m in beam)]
     near = [g for g in near if score(g) < score(beam[0]) + NEAR][:BEAM]
-    return sorted(again, key=score), [*again, *(fitter.fit(g.terms, g) for g in near)]
+    return sorted(again, key=score), [*again, *_refitted(fitter, near)]
+
+
+def _refitted(fitter: Fitter, models: Sequence[Fitted]) -> list[Fitted]:
+    """Return models fitted again, each from where it was."""
+    return shared(lambda m: fitter.fit(m.terms, m), models)
 
 
 @dataclass(frozen=True)
@@ -253,28 +270,38 @@ def until(ends: float, share: float) -> float:
     return now + share * max(ends - now, 0.0)
 
 
-def look(fitter: Fitter, model: Fitted, ends: float = math.inf) -> Look:
+def look(
+    fitter: Fitter, model: Fitted, ends: float = math.inf, known: Sequence[Candidate] | None = None
+) -> Look:
     """Look at all candidates beside a model, or those made in time, without their null distribution."""
-    made = candidates(fitter, model, ent.names(model.entries), ends=ends)
+    made = candidates(fitter, model, ent.names(model.entries), ends=ends, known=known or ())
     cut = time.monotonic() > ends
     screen = Screen(made, fitter.block, fitter.blocks, fitter.use)
     return Look(made, screen.gains(free_columns(model), model.residual), screen, None, cut)
 
 
 def _judged(
-    fitter: Fitter, model: Fitted, seed: int, say: Say, first: Look | None, ends: float, *, late: bool
+    fitter: Fitter,
+    model: Fitted,
+    seed: int,
+    say: Say,
+    first: Look | None,
+    known: Sequence[Candidate] | None,
+    ends: float,
+    *,
+    late: bool,
 ) -> Look:
     """Return the look beside a model, which `ends` in time, with its null distribution.
 
-    `first` is that look, where it was taken before; where it is too `late` for one, only what chance leaves
-    is looked at.
+    `first` is that look, where it was taken before; `known` are candidates beside a smaller model. Where it
+    is too `late` for one, only what chance leaves is looked at.
     """
     names = ent.names(model.entries)
     what = f"beside {' and '.join(names)}" if names else "search"
     say(0.0, what)
     if late:
         first = Look([], [], Screen([], fitter.block, fitter.blocks, fitter.use), None)
-    seen = first or look(fitter, model, ends)
+    seen = first or look(fitter, model, ends, known)
     say(0.5, what)
     return replace(seen, null=null_of(fitter, model, seen.screen, seen.gain, seed, ends))
 

@@ -44,6 +44,15 @@ def _force(stage: Stage, voltage: Floats) -> Floats:
     return stage.force_constant * np.clip(voltage, -stage.voltage_limit, stage.voltage_limit)
 
 
+def hides(untold: float, noise: float, left: float) -> bool:
+    """Tell whether friction that no motion tells may make half of what a balance of forces leaves open.
+
+    Together with noise; both and what is `left` are parts of the drive's force (rms). Where more is left, the
+    balance sees what is missing.
+    """
+    return min(untold, noise) > MUCH and untold**2 + noise**2 > 0.5 * left**2
+
+
 @compiled
 def _widths(x: Floats, force: Floats, width: float, most: float, out: Floats) -> None:
     first = 0

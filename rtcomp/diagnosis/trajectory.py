@@ -43,7 +43,7 @@ TRIES = 4
 class Trajectory(Fitter):
     """Fits models to where the axis went."""
 
-    gridded = False
+    by_force = False
 
     def __init__(self, balance: ForceBalance, stage: Stage, windows: Windows, scale: float) -> None:
         super().__init__(balance)
@@ -52,8 +52,8 @@ class Trajectory(Fitter):
         self.belief, self.windows, self.scale = Belief(stage, force), windows, scale
         """The numbers that are moved; where a stage is let go; error (m) beyond which one counts less."""
         self._rows = windows.rows
-        moved = windows.moved()[windows.block < GROUPS]
-        self._power = float(np.sum((moved / scale) ** 2))
+        forced = windows.forced()[windows.block < GROUPS]
+        self._power = float(np.sum((forced / scale) ** 2))
 
     @classmethod
     def of(cls, balance: ForceBalance, stage: Stage) -> Trajectory:
@@ -81,7 +81,7 @@ class Trajectory(Fitter):
 
     @property
     def power(self) -> float:
-        """See `Fitter`: squared travel within the windows."""
+        """See `Fitter`: squared way that forces moved the axis within the windows."""
         return self._power
 
     def linear(self, kind: type[Effect]) -> bool:
@@ -122,7 +122,7 @@ class Trajectory(Fitter):
         return np.zeros((0, model.residual.size))
 
     def relative(self, model: Fitted) -> float:
-        """See `Fitter`: error over travel."""
+        """See `Fitter`: error over the way that forces moved the axis."""
         return self._relative(model.residual)
 
     def relative_of(self, stage: Stage) -> float:

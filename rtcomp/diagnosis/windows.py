@@ -116,6 +116,16 @@ class Windows:
             off *= np.sqrt(max(float(np.sum(self.moved() ** 2)) / max(left, 1e-300), 1.0))
         return np.asarray(np.clip(off, -far, far)[self.order])
 
+    def forced(self) -> Floats:
+        """Return how far the recorded position is from where its first speed would have led, m, (W, rows).
+
+        So far did forces move it: an axis that runs on at its speed covers much way and shows none.
+        """
+        pairs = zip(self.balance.paths(), self.starts, strict=True)
+        speed = np.concatenate([path.v[starts] for path, starts in pairs])[self.order]
+        time = np.arange(self.rows) * self.balance.data.period
+        return np.asarray(self.moved() - speed[:, None] * time)
+
     def moved(self) -> Floats:
         """Return how far the recorded position is from where each window begins, m, (W, rows)."""
         found = []

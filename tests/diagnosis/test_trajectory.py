@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from recorded import measured
 
 from rtcomp.diagnosis.balance import ForceBalance
@@ -15,7 +18,7 @@ from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.replicate import replicate
-from rtcomp.diagnosis.sticking import MUCH, part_untold, untold
+from rtcomp.diagnosis.sticking import MUCH, hides, part_untold, untold
 from rtcomp.diagnosis.trajectory import Trajectory
 from rtcomp.diagnosis.windows import GROUPS, Windows
 from rtcomp.errors import ConfigError
@@ -99,6 +102,29 @@ def test_presliding_that_the_sensor_resolves_is_not_hidden() -> None:
     plant = stage(friction=[{"stiffness": 1.0, "reach": 0.04}])
     sees = Stage.from_dict({**plant.to_dict(), "sensor": {"resolution": 1e-6}})
     assert part_untold(sees, [recorded(sees)]) < 0.02 < MUCH < part_untold(stage(), [recorded(stage(LOAD))])
+
+
+@given(
+    st.floats(1.1 * MUCH, 1.0), st.floats(1.1 * MUCH, 1.0), st.floats(0.0, 3.0), st.floats(0.0, 0.9 * MUCH)
+)
+def test_what_a_balance_sees_beyond_noise_and_rest_it_judges(
+    rest: float, noise: float, left: float, little: float
+) -> None:
+    """The larger what is left, the less of it can be hidden; without noise or rest nothing is."""
+    assert hides(rest, noise, min(rest, noise))
+    assert not hides(rest, noise, 1.5 * (rest + noise))
+    assert hides(rest, noise, 0.5 * left) or not hides(rest, noise, left)
+    assert not hides(little, noise, left) and not hides(rest, little, left)
+
+
+def test_a_way_run_at_a_steady_speed_is_no_work_of_forces(loaded: list[Recording]) -> None:
+    balance = balanced(stage(), loaded)
+    windows = Windows.of(balance)
+    own = windows.forced()
+    gone = tuple(replace(s, position=s.position + 3.0 * s.time) for s in balance.data.segments)
+    faster = windows.on(balance.on(replace(balance.data, segments=gone)))
+    assert np.std(faster.moved() - windows.moved()) > 0.2 * np.std(own)
+    assert faster.forced() == pytest.approx(own, abs=0.03 * float(np.std(own)))
 
 
 @pytest.mark.parametrize(
