@@ -191,6 +191,9 @@ def _points(kind: type[Effect], scales: Scales, fitter: Fitter) -> Iterator[tupl
             if name in base and p.unit in NOT_IN_PROPORTION:
                 still = {q.name: (scales.of_parameter(q, kind) or [0.0])[0] for q in nonlinear}
                 yield from (({**base, **still, name: value}, "") for value in scales.of_parameter(p, kind))
+            elif name in base and p.unit == "m" and ent.happens_once(kind):  # further than friction yields
+                jumps = fitter.balance.data.jumps
+                yield from (({**base, ent.MOMENT: j.time, name: j.size}, "") for j in jumps)
 
 
 def _searched(kind: type[Effect], p: Parameter) -> bool:

@@ -169,6 +169,9 @@ def _windows(segment: Segment, count: int, rows: int) -> list[Segment]:
     if segment.time.size <= count * rows:
         return [segment]
     starts = np.linspace(0, segment.time.size - rows, count).astype(np.int64)
+    seen = segment.source or segment
+    for jump in jumps(seen.time, seen.position)[:1]:
+        starts = _with_row(starts, int(np.searchsorted(segment.time, jump.time)), rows, segment.time.size)
     earlier = np.zeros(0) if segment.before is None else segment.before
     return [
         replace(
@@ -178,6 +181,29 @@ def _windows(segment: Segment, count: int, rows: int) -> list[Segment]:
         )
         for k in starts.tolist()
     ]
+
+
+def _with_row(starts: np.ndarray, row: int, rows: int, size: int) -> np.ndarray:
+    """Return starts (W,) of windows of so many `rows`, moved so that one compares a `row`, if one can.
+
+    What happens once would else be missed, where it is between them.
+    """
+    number = np.arange(starts.size)
+    first, last = number * rows, size - (starts.size - number) * rows
+    wanted = np.clip(starts, row - int(0.9 * rows), row - int(1.5 * RUN_IN * rows))
+    wanted = np.clip(wanted, first, last)
+    compares = (wanted + RUN_IN * rows * (wanted > 0) <= row) & (row < wanted + rows)
+    moved = np.where(compares, np.abs(wanted - starts), size)
+    at = int(np.argmin(moved))
+    if moved[at] == size:
+        return starts
+    found = starts.copy()
+    found[at] = wanted[at]
+    for k in range(at + 1, found.size):
+        found[k] = max(found[k], found[k - 1] + rows)
+    for k in range(at - 1, -1, -1):
+        found[k] = min(found[k], found[k + 1] - rows)
+    return found
 
 
 def reversals(position: Floats) -> int:

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis import starting
 from rtcomp.diagnosis.at_hand import by_weights, consistent, goes_by_whole, newly_behind, system_around
 from rtcomp.diagnosis.balance import BASE, ForceBalance, System
 from rtcomp.diagnosis.believed import prior_of
@@ -87,7 +88,7 @@ class Fitter:
 
     def rough(self, model: Fitted, families: Sequence[Sequence[Term]], count: int, ends: float) -> list[Term]:
         """Return terms of `count` families worth a full fit; the likeliest come first there and in each."""
-        return [terms[0] for terms in families[:count]]
+        return starting.as_they_are(lambda term: self.quick([*model.terms, term]), families[:count], ends)
 
     def units(self, entries: Sequence[Entry]) -> Floats:
         """Return the columns (q, n) of unit sizes of the last of `entries`, which is `linear`."""
@@ -221,8 +222,7 @@ class Fitter:
     def fit(self, terms: Sequence[Term], start: Fitted | None = None, steps: int = STEPS) -> Fitted:
         """Fit a model from the values that its terms have; raise ConfigError where these are impossible."""
         b = self.balance
-        current = list(terms)
-        weights = b.weights
+        current, weights = list(terms), b.weights
         alike = start is not None and start.weights.size == b.reaches.size
         if start is not None and alike and not newly_behind(terms, start.terms):
             weights = start.weights

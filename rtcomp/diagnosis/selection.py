@@ -15,7 +15,7 @@ from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.growing import grow
+from rtcomp.diagnosis.growing import fitted_in_time, grow
 from rtcomp.diagnosis.replicates import best, free_columns, null_of
 from rtcomp.diagnosis.screening import Screen, Screened
 from rtcomp.diagnosis.settings import BEAM, LEAST_GAIN, LEVEL, MOST_EFFECTS
@@ -148,6 +148,10 @@ def _grown(
             return grown, True
         began = moment
         grown += grow(fitter, other, *_beside(other, seen), ends)
+        # Both together were begun from what the best had alone, which may be bent to do without this one.
+        last = beam[0].terms[-1:]
+        missing = [t for t in last if t.entry["name"] not in ent.names(other.entries)]
+        grown += fitted_in_time(fitter, other, missing, ends)
     return grown, time.monotonic() > ends
 
 

@@ -24,6 +24,31 @@ FEW = 3
 """Steps after which starts are compared."""
 
 
+STARTS = 2
+"""Likeliest values of an effect of which the better ones, as they are, are fitted."""
+
+
+def as_they_are(left: Callable[[Term], float], families: Sequence[Sequence[Term]], ends: float) -> list[Term]:
+    """Return one term of each family: of those likeliest to first order that with which least is `left`.
+
+    What is far from first order, as a reading that jumps further than friction yields, shows only as it is
+    which of its values is right.
+    """
+
+    def tried(term: Term) -> float:
+        try:
+            return left(term) if time.monotonic() < ends else math.inf
+        except (ConfigError, np.linalg.LinAlgError):
+            return math.inf
+
+    some = [terms[:STARTS] for terms in families]
+    errors = iter(shared(tried, [term for terms in some for term in terms]))
+    return [
+        min(zip([next(errors) for _ in terms], terms, strict=True), key=lambda one: one[0])[1]
+        for terms in some
+    ]
+
+
 class Stepped(Protocol):
     """What fits a model step by step, all its numbers at once."""
 

@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from recorded import run, stage, there_and_back
 
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import baseline
 from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.growing import grow
 from rtcomp.diagnosis.selection import look
+from rtcomp.diagnosis.starting import STARTS, as_they_are
 
 STRIBECK = {"name": "stribeck", "rise": 0.4, "velocity": 1.5e-3}
 
@@ -31,3 +35,12 @@ def test_an_effect_is_grown_in_the_form_that_it_has(following: float) -> None:
     assert best["name"] == "frictional-lag"
     assert best["following"] == following
     assert best["time_constant"] == pytest.approx(late["time_constant"], rel=0.1)
+
+
+@given(st.lists(st.lists(st.floats(0.0, 9.0), min_size=1, max_size=4), max_size=6))
+def test_of_the_likeliest_starts_that_is_taken_which_leaves_least(errors: list[list[float]]) -> None:
+    families = [[Term.of({"name": "drive-lag", "time_constant": e}) for e in family] for family in errors]
+    found = as_they_are(lambda term: float(term.entry["time_constant"]), families, math.inf)
+    assert [t.entry["time_constant"] for t in found] == [min(family[:STARTS]) for family in errors]
+    late = as_they_are(lambda term: float(term.entry["time_constant"]), families, -math.inf)
+    assert late == [family[0] for family in families]

@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rtcomp.diagnosis.data import MOST_ROWS, RUN_IN, WINDOWS, load_data
 from rtcomp.diagnosis.jumps import jumps
 from rtcomp.recording.outliers import answers, outliers
+from rtcomp.recording.reader import Recording
 from rtcomp.stage.lowpass import zero_phase
 
 
@@ -67,3 +69,17 @@ def test_the_command_that_answers_a_step_is_told_from_one_that_does_not() -> Non
     answered = answers(x)
     assert answered[2000:2004].all()
     assert not answered[:1990].any() and not answered[2020:].any()
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2 * MOST_ROWS - 50), st.sampled_from([-1.0, 1.0]))
+def test_windows_of_a_long_recording_do_not_miss_a_jump(row: int, sign: float) -> None:
+    time, x = moved(rows=2 * MOST_ROWS)
+    x[row + 25 :] += sign * 2e-6
+    data = load_data([Recording({"time": time, "position": x, "voltage": np.cos(time)}, 1000.0)])
+    rows = MOST_ROWS // WINDOWS
+    starts = [int(np.searchsorted(time, s.time[0])) for s in data.segments]
+    assert [s.time.size for s in data.segments] == [rows] * WINDOWS
+    assert all(np.diff(starts) >= rows) and starts[0] >= 0 and starts[-1] <= time.size - rows
+    assert any(first + RUN_IN * rows * (first > 0) <= row + 25 < first + rows for first in starts)
+    assert data.jumps[0].time == pytest.approx((row + 24.5) / 1000.0)
