@@ -57,7 +57,7 @@ class Candidate:
     @property
     def point(self) -> Hashable:
         """What tells it from others, whatever it stands beside."""
-        return frozenset(self.term.entry.items()), self.looked
+        return _key((self.term.entry, self.looked))
 
     @property
     def name(self) -> str:
@@ -120,7 +120,7 @@ def candidates(
     made = {c.point: c for c in known}
 
     def make(item: tuple[type[Effect], tuple[Entry, str]]) -> Candidate | None:
-        before = made.get((frozenset(item[1][0].items()), item[1][1]))
+        before = made.get(_key(item[1]))
         if before is not None or time.monotonic() > ends:
             return before
         return _candidate(fitter, fitted, *item)
@@ -141,6 +141,10 @@ def candidates(
         if not _first_form(kind, point) and any(_alike(kind, point[0], e) for e in likely.get(kind.name, []))
     ]
     return [*shown, *(c for c in shared(make, others) if c is not None)]
+
+
+def _key(point: tuple[Entry, str]) -> Hashable:
+    return frozenset(point[0].items()), point[1]
 
 
 def _first_form(kind: type[Effect], point: tuple[Entry, str]) -> bool:
