@@ -2,31 +2,37 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
 
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.acceptance import score
 from rtcomp.diagnosis.candidates import Candidate, started
 from rtcomp.diagnosis.cores import shared
-from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.scanning import scanned, scanned_widely
 from rtcomp.diagnosis.screening import Screened
-from rtcomp.diagnosis.settings import FULL_FITS
+from rtcomp.diagnosis.settings import FULL_FITS, LEFT, TOLERANCE
 from rtcomp.errors import ConfigError
-
-SCANNED, AWAY = 14, 10.0
-"""Values of a number that are tried where first order is no guide; how many times its default they go to."""
 
 
 def grow(
-    fitter: Fitter, model: Fitted, made: Sequence[Candidate], screened: Sequence[Screened], ends: float
+    fitter: Fitter,
+    model: Fitted,
+    made: Sequence[Candidate],
+    screened: Sequence[Screened],
+    ends: float,
+    *,
+    widely: bool = True,
 ) -> list[Fitted]:
-    """Return the model with each of the best candidates, fitted in full."""
+    """Return the model with each of the best candidates, fitted in full.
+
+    Where none of them explains it, what is behind a play is scanned `widely`.
+    """
     families: dict[str, list[Term]] = {}
     gains: dict[str, float] = {}
     for i in np.argsort([-s.gain for s in screened], kind="stable").tolist():
@@ -38,9 +44,19 @@ def grow(
     behind = {c.name: c.term for c in made if fitter.by_force and ent.kind_of(c.term.entry).behind}
     terms = [t for t in terms if t.entry["name"] not in behind]
     for term in behind.values():
-        terms += _scanned(fitter, model, term, least, ends)
+        terms += scanned(fitter, model, term, least, ends)
     found = fitted_in_time(fitter, model, terms, ends)
+    if widely and behind and _unexplained(fitter, model, found):
+        terms = [one for term in behind.values() for one in scanned_widely(fitter, model, term, ends)]
+        found += fitted_in_time(fitter, model, terms, ends)
     return [*found, *fitted_in_time(fitter, model, _in_better_form(fitter, found, ends), ends)]
+
+
+def _unexplained(fitter: Fitter, model: Fitted, grown: Sequence[Fitted]) -> bool:
+    """Tell whether the best of the larger models leaves more of the force than what explains it would."""
+    there = fitter.above_noise(model)
+    left = [fitter.above_noise(min(grown, key=score))] if grown else []
+    return there > TOLERANCE and all(each**2 > LEFT * there**2 for each in left)
 
 
 def _in_better_form(fitter: Fitter, found: Sequence[Fitted], ends: float) -> list[Term]:
@@ -79,42 +95,3 @@ def fitted_in_time(fitter: Fitter, model: Fitted, terms: Sequence[Term], ends: f
             return None
 
     return [f for f in shared(fit, terms) if f is not None]
-
-
-def _scanned(fitter: Fitter, model: Fitted, term: Term, least: float, ends: float) -> list[Term]:
-    """Return the term at the length at which a model with it fits best; none where it fits best without.
-
-    Where this gains as much as the `least` of what is fitted in full, also with those numbers free that else
-    have their defaults: how a load meets the ends of its play decides which length fits. They are looked
-    through one after the other, frequencies first, of which many fit almost, then the length again.
-    """
-    length = next(p.name for p in ent.free_parameters(term.entry, linear=False) if p.unit == "m")
-    stated = [p for p in ent.kind_of(term.entry).parameters if p.default is not None]
-    low, high = fitter.balance.data.stroke
-    lengths = np.geomspace(2.0 * fitter.balance.grain, 0.25 * (high - low), SCANNED)
-
-    def error(entry: Entry) -> float:
-        if time.monotonic() > ends:
-            return np.inf
-        try:
-            return fitter.quick([*model.terms, term.with_entry(entry)])
-        except (ConfigError, np.linalg.LinAlgError):
-            return np.inf
-
-    def best(entry: Entry, name: str, values: Sequence[float]) -> tuple[float, Entry]:
-        tried = [entry, *({**entry, name: value} for value in values)]
-        return min(zip(shared(error, tried), tried, strict=True), key=lambda one: one[0])
-
-    left, alone = best(term.entry, length, lengths.tolist())
-    if left >= model.sse:
-        return []
-    if math.log(model.sse / left) < least:
-        return [term.with_entry(alone)]
-    entry = {**{p.name: p.default for p in stated}, **alone}
-    for p in sorted(stated, key=lambda p: p.unit != "Hz"):
-        values = float(entry[p.name]) * np.geomspace(1.0 / AWAY, AWAY, SCANNED)
-        values = values[(values > p.lowest) & (values < ent.highest(entry, p))]
-        _, entry = best(entry, p.name, values.tolist())
-    shorter = float(entry[length]) * np.geomspace(1.0 / AWAY, 1.0, SCANNED)
-    _, entry = best(entry, length, shorter.tolist())
-    return [term.with_entry(alone), Term.of(entry)]
