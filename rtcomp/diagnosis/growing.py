@@ -26,12 +26,10 @@ def grow(
     made: Sequence[Candidate],
     screened: Sequence[Screened],
     ends: float,
-    *,
-    widely: bool = True,
 ) -> list[Fitted]:
     """Return the model with each of the best candidates, fitted in full.
 
-    Where none of them explains it, what is behind a play is scanned `widely`.
+    Where the best of them does not explain what the belief leaves, what is behind a play is scanned widely.
     """
     families: dict[str, list[Term]] = {}
     gains: dict[str, float] = {}
@@ -46,7 +44,7 @@ def grow(
     for term in behind.values():
         terms += scanned(fitter, model, term, least, ends)
     found = fitted_in_time(fitter, model, terms, ends)
-    if widely and behind and _unexplained(fitter, model, found):
+    if behind and not model.terms and _unexplained(fitter, model, found):
         terms = [one for term in behind.values() for one in scanned_widely(fitter, model, term, ends)]
         found += fitted_in_time(fitter, model, terms, ends)
     return [*found, *fitted_in_time(fitter, model, _in_better_form(fitter, found, ends), ends)]

@@ -20,7 +20,7 @@ from rtcomp.physics import Parameter
 
 SCANNED, AWAY = 14, 10.0
 """Values of a number that are tried where first order is no guide; how many times its default they go to."""
-CLOSE, SLOWER = 1.3, 1.8
+CLOSE, SLOWER = 1.4, 1.8
 """Ratios of lengths and of frequencies in a wide scan: a play shows within a fifth of its gap, and where its
 load meets the ends about as fast as it does."""
 FREQUENCIES = 4

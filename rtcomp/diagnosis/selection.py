@@ -147,7 +147,7 @@ def _grown(
         if 2.0 * moment - began > ends:
             return grown, True
         began = moment
-        grown += grow(fitter, other, *_beside(other, seen), ends, widely=False)
+        grown += grow(fitter, other, *_beside(other, seen), ends)
         # Both together were begun from what the best had alone, which may be bent to do without this one.
         last = beam[0].terms[-1:]
         missing = [t for t in last if t.entry["name"] not in ent.names(other.entries)]
