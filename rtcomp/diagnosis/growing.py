@@ -21,11 +21,7 @@ from rtcomp.errors import ConfigError
 
 
 def grow(
-    fitter: Fitter,
-    model: Fitted,
-    made: Sequence[Candidate],
-    screened: Sequence[Screened],
-    ends: float,
+    fitter: Fitter, model: Fitted, made: Sequence[Candidate], screened: Sequence[Screened], ends: float
 ) -> list[Fitted]:
     """Return the model with each of the best candidates, fitted in full.
 

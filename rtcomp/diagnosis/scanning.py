@@ -39,9 +39,7 @@ def scanned(fitter: Fitter, model: Fitted, term: Term, least: float, ends: float
     through one after the other, frequencies first, of which many fit almost, then the length again.
     """
     length, stated = _length(term), _stated(term)
-    low, high = fitter.balance.data.stroke
-    lengths = np.geomspace(2.0 * fitter.balance.grain, 0.25 * (high - low), SCANNED)
-
+    lengths = np.geomspace(*_lengths(fitter), SCANNED)
     best = _best_of(fitter, model, term, ends)
     left, alone = best(term.entry, length, lengths.tolist())
     if left >= model.sse:
@@ -68,8 +66,7 @@ def scanned_widely(fitter: Fitter, model: Fitted, term: Term, ends: float) -> li
     step = float(np.log(coarse[-1] / coarse[0])) / (UNITS - 1)
     few.balance.put(np.geomspace(coarse[0], coarse[-1], UNITS), step)
     length, stated = _length(term), _stated(term)
-    low, high = fitter.balance.data.stroke
-    shortest, longest = 2.0 * fitter.balance.grain, 0.25 * (high - low)
+    shortest, longest = _lengths(fitter)
     count = 2 + int(math.log(max(longest / shortest, 1.0)) / math.log(CLOSE))
     entry = {**{p.name: p.default for p in stated}, **term.entry}
     found = [(few.quick(model.terms), entry)]
@@ -86,6 +83,12 @@ def scanned_widely(fitter: Fitter, model: Fitted, term: Term, ends: float) -> li
             values = float(entry[name]) * np.geomspace(1.0 / SLOWER, SLOWER, NEAR)
             _, entry = best(entry, name, values[values < most].tolist())
     return [Term.of(entry)]
+
+
+def _lengths(fitter: Fitter) -> tuple[float, float]:
+    """Return the shortest and the longest length (m) of a play: two grains, a quarter of the stroke."""
+    low, high = fitter.balance.data.stroke
+    return 2.0 * fitter.balance.grain, 0.25 * (high - low)
 
 
 def _length(term: Term) -> str:

@@ -22,8 +22,6 @@ POINTS = 10
 """Values of its nonlinear parameters, the likeliest first, from which an effect is tried."""
 FEW = 3
 """Steps after which starts are compared."""
-
-
 STARTS = 2
 """Likeliest values of an effect of which the better ones, as they are, are fitted."""
 
