@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rtcomp.diagnosis.confirmed import denied
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
@@ -20,6 +21,7 @@ from rtcomp.diagnosis.significance import Null, log_gain
 PLAINER = 1e-3
 """Logarithm of the error that one parameter more must gain to count at all."""
 TOO_MUCH = "{:.0f} % of what there is without it is left, more than noise"
+NOT_SHOWN = "it does not show in {}"
 
 
 def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, everything: float) -> bool:
@@ -115,5 +117,7 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
             left, there = (fitter.above_noise(model, louder) ** 2 for model in (rest, without))
             left *= beyond / max(there, 1e-300)
             why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""
+            if not why and denied(fitter, chosen, without):
+                why = NOT_SHOWN.format("simulated positions" if fitter.by_force else "forces")
         said.append(Doubt(why, left))
     return said

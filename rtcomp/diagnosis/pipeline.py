@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rtcomp.diagnosis.answer import answer
+from rtcomp.diagnosis.answer import Rest, answer
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import baseline, settle, with_offset
 from rtcomp.diagnosis.confidence import alternatives
@@ -21,7 +21,7 @@ from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.result import Diagnosis, Place
 from rtcomp.diagnosis.selection import LOOKED, Look, Search, look, search, until
 from rtcomp.diagnosis.settings import BUDGET
-from rtcomp.diagnosis.sticking import hides, part_untold
+from rtcomp.diagnosis.sticking import hides, part_untold, sticks
 from rtcomp.diagnosis.trajectory import Trajectory
 from rtcomp.diagnosis.validation import Reserved
 from rtcomp.diagnosis.where import Compared, as_force
@@ -87,10 +87,16 @@ def _diagnosed(
         left = (base.sse / max(balance.power, 1e-300)) ** 0.5
         located(left, locate(view, before, None, seed, stage.axis))
     say(1.0, "balance")
-    untold = part_untold(stage, recordings)
-    if hides(untold, _noise(balance), objectives[0].fitter.relative(base)):
-        objectives = [_by_trajectory(stage, objectives[0])]
-    fitter, found = _searched(objectives, ends - (1.0 - SEARCH) * budget, say, seed)
+    untold, noise = part_untold(stage, recordings), _noise(balance)
+    searched = ends - (1.0 - SEARCH) * budget
+    by_force = objectives[0]
+    judges = [] if hides(untold, noise, by_force.fitter.relative(base)) else ["force"]
+    judges += ["position"] if sticks(untold, noise) else []
+    for i, judge in enumerate(judges):
+        ways = objectives if judge == "force" else [_by_trajectory(stage, by_force)]
+        fitter, found = _searched(ways, until(searched, 1.0 / (len(judges) - i)), say, seed)
+        if found.chosen.terms or not Rest.of(fitter, found).significant:
+            break  # else, what forces do not explain, positions may
     say(0.0, "tell apart")
     sets = alternatives(fitter, found, ends - (1.0 - TELL_APART) * budget)
     say(0.5, "judge")
@@ -98,7 +104,7 @@ def _diagnosed(
         reserved = Reserved(fitter.balance)
     done = answer(stage, fitter, found, sets, reserved, seed, late=time.monotonic() > ends)
     say(1.0, "judge")
-    notes = [BAND_LIMITED] if len(objectives) > 1 and not fitter.balance.data.held else []
+    notes = [BAND_LIMITED] if len(ways) > 1 and not fitter.balance.data.held else []
     notes += [STICKS.format(100.0 * untold, done.position.seconds)] if done.position is not None else []
     notes += [f"not tried within {budget:g} s: {what}" for what in found.not_tried]
     return replace(done, notes=[*notes, *done.notes], not_tried=found.not_tried)

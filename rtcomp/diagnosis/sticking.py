@@ -44,13 +44,20 @@ def _force(stage: Stage, voltage: Floats) -> Floats:
     return stage.force_constant * np.clip(voltage, -stage.voltage_limit, stage.voltage_limit)
 
 
-def hides(untold: float, noise: float, left: float) -> bool:
-    """Tell whether friction that no motion tells may make half of what a balance of forces leaves open.
+def sticks(untold: float, noise: float) -> bool:
+    """Tell whether friction that no motion tells, and noise, each make much of a balance of forces.
 
-    Together with noise; both and what is `left` are parts of the drive's force (rms). Where more is left, the
-    balance sees what is missing.
+    Both are parts of the drive's force (rms).
     """
-    return min(untold, noise) > MUCH and untold**2 + noise**2 > 0.5 * left**2
+    return min(untold, noise) > MUCH
+
+
+def hides(untold: float, noise: float, left: float) -> bool:
+    """Tell whether an axis `sticks`, and this may make half of what a balance of forces has `left`.
+
+    Where more is left, the balance sees what is missing.
+    """
+    return sticks(untold, noise) and untold**2 + noise**2 > 0.5 * left**2
 
 
 @compiled

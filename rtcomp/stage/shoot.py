@@ -1,9 +1,10 @@
 """A stage let go from points of a recorded motion: short simulations, each from where the recording was.
 
 Up to its start the chain is led along the recorded motion, so that friction, delays and everything else that
-remembers has the memory of that motion; from there it runs free, driven by the recorded command. What it
-moves off by is an error of position that no controller hides, and that a missed break-away spoils for one
-window only (multiple shooting: Bock 1981; van Domselaar, Hemker 1975).
+remembers has the memory of that motion (in steps that what swings by itself bears, as a load on its contact);
+from there it runs free, driven by the recorded command. What it moves off by is an error of position that no
+controller hides, and that a missed break-away spoils for one window only (multiple shooting: Bock 1981; van
+Domselaar, Hemker 1975).
 """
 
 from __future__ import annotations
@@ -55,7 +56,8 @@ def shoot(
     starts = np.sort(np.asarray(starts, dtype=np.int64))
     if rows < 1 or (starts.size and (starts[0] < 0 or starts[-1] + rows > time.size)):
         raise ValueError(f"windows of {rows} rows from {starts} do not lie within {time.size} rows")
-    program = Program([e for e in stage.chain if e.place is not Place.SENSOR])
+    moving = [e for e in stage.chain if e.place is not Place.SENSOR]
+    program = Program(moving)
     period = float((time[-1] - time[0]) / max(time.size - 1, 1))
     stroke = WIDER * float(np.abs(position).max(initial=0.0))
     count = max(1, math.ceil(period / (coarse * largest_step(stage, stroke)) - 1e-9))
@@ -63,7 +65,9 @@ def shoot(
     motion = np.ascontiguousarray(np.column_stack([time, position, velocity, voltage]))
     out = np.empty((starts.size, rows))
     w = np.zeros(wires.COUNT)
-    _shoot(program.steps, program.p, program.s, w, base, motion, starts, period, count, out)
+    longest = min((e.longest_step() for e in moving), default=math.inf)
+    led = max(1, math.ceil(period / longest - 1e-9))
+    _shoot(program.steps, program.p, program.s, w, base, motion, starts, period, led, count, out)
     return out
 
 
@@ -77,22 +81,27 @@ def _shoot(
     motion: Floats,
     starts: np.ndarray,
     period: float,
+    led: int,
     count: int,
     out: Floats,
 ) -> None:
-    """Lead the chain along `motion` and let it go at `starts`; fill `out`."""
+    """Lead the chain along `motion`, `led` steps from row to row, and let it go at `starts`; fill `out`."""
     window = 0
     for k in range(motion.shape[0]):
         if window >= starts.size:
             break
         last = max(k - 1, 0)
-        w[TIME], w[STEP] = motion[k, 0], motion[k, 0] - motion[last, 0]
-        w[POSITION], w[VELOCITY] = motion[k, 1], motion[k, 2]
-        w[MOVED] = motion[k, 1] - motion[last, 1]
-        w[ACCELERATION] = (motion[k, 2] - motion[last, 2]) / period
-        w[VOLTS] = motion[last, 3]
-        renew(w, base[0], base[1])
-        run_chain(steps, p, s, w, 0, steps[COUNT])
+        gone = motion[k] - motion[last]
+        w[STEP] = gone[0] / led
+        w[ACCELERATION] = gone[2] / period
+        for i in range(1, led + 1):
+            part = (led - i) / led
+            w[TIME] = motion[k, 0] - part * gone[0]
+            w[POSITION], w[VELOCITY] = motion[k, 1] - part * gone[1], motion[k, 2] - part * gone[2]
+            w[MOVED] = gone[1] / led
+            w[VOLTS] = motion[last, 3]
+            renew(w, base[0], base[1])
+            run_chain(steps, p, s, w, 0, steps[COUNT])
         while window < starts.size and starts[window] == k:
             free, wires_free, base_free = s.copy(), w.copy(), base.copy()
             wires_free[STEP] = wires_free[MOVED] = 0.0

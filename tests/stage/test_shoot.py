@@ -50,6 +50,18 @@ def test_let_go_anywhere_it_goes_on_as_it_did():
     assert np.abs(found - truth).max() < 2e-3
 
 
+def test_a_load_behind_a_play_is_where_it_was():
+    """Its contact rings faster than rows follow one another: it is led there in finer steps."""
+    play = {"name": "backlash", "gap": 0.02, "share": 0.5, "contact": 80.0}
+    loose = PENDULUM.with_changes(stage={"viscous": 0.2, "effects": [play]})
+    time, position, velocity, voltage = simulated(loose)
+    starts = np.arange(0, 1300, 30)
+    found = shoot(loose, time, position, velocity, voltage, starts, 20)
+    truth = np.array([position[s : s + 20] for s in starts])
+    moved = np.abs(truth - truth[:, :1])
+    assert np.abs(found - truth).mean() < 0.03 * moved.mean()
+
+
 def test_the_friction_remembers_what_was_before_the_start():
     # Let go where it turns: without its memory friction would be nothing there, and the lag empty.
     time, position, velocity, voltage = simulated(PENDULUM)

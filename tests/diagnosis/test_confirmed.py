@@ -1,0 +1,67 @@
+"""A model is confirmed by the objective that it was not fitted to: by positions, or by forces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from recorded import run, stage, there_and_back
+from test_trajectory import LOAD, balanced, both
+from test_trajectory import stage as pendulum
+
+from rtcomp.diagnosis.confirmed import denied, errors, shows
+from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.trajectory import Trajectory
+from rtcomp.diagnosis.windows import Windows
+
+COGGING = {"name": "cogging", "amplitude": 0.4, "period": 1.3e-4, "phase": 0.4}
+
+
+@given(st.floats(-1.0, 2.0), st.floats(1e-6, 1e6), st.integers(0, 1000))
+def test_the_part_that_is_there_shows(part: float, unit: float, seed: int) -> None:
+    """Errors without an effect are the part of it that is there; with it, that less all of it."""
+    done = unit * np.random.default_rng(seed).standard_normal((12, 40))
+    assert shows([part * d - d for d in done], [part * d for d in done]) == pytest.approx(part)
+
+
+@given(st.integers(0, 1000))
+def test_a_window_that_went_far_off_says_no_more_than_others(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    done = random.standard_normal((12, 40))
+    rest = 0.1 * random.standard_normal((12, 40))
+    rest[3] *= 1e4
+    assert shows(list(rest), list(done + rest)) == pytest.approx(1.0, abs=0.1)
+
+
+def test_simulated_positions_confirm_what_forces_found() -> None:
+    recording = run(stage(effects=[COGGING]), there_and_back(8.0))
+    fitter = Fitter(balanced(stage(), [recording]))
+    right, wrong = (
+        fitter.fit([term], steps=0)
+        for term in (Term.of(COGGING), Term({"name": "drive-delay", "delay": 4e-3}, frozenset()))
+    )
+    without = fitter.fit([])
+    windows = Windows.of(fitter.balance)
+    assert shows(*(errors(fitter, m, windows) for m in (right, without))) == pytest.approx(1.0, abs=0.05)
+    assert not denied(fitter, right, without)
+    assert denied(fitter, wrong, without)
+
+
+def test_forces_confirm_what_positions_found() -> None:
+    fitter = Trajectory.of(balanced(pendulum(), both(pendulum(LOAD))), pendulum())
+    without = fitter.fit([])
+    found = fitter.fit([Term(LOAD, frozenset({"coefficient"}))], without)
+    assert shows(*(errors(fitter, m, None) for m in (found, without))) > 0.8
+    assert not denied(fitter, found, without)
+
+
+@pytest.mark.parametrize("gap", [5e-7, 5e-6])
+def test_a_play_that_is_there_is_not_denied(gap: float) -> None:
+    """Noise of the reading kicks its load: where replicates go another way, there is nothing to compare."""
+    play = {"name": "backlash", "gap": gap, "share": 0.5, "contact": 150.0}
+    recording = run(stage(effects=[play]), there_and_back(8.0))
+    fitter = Fitter(balanced(stage(), [recording]))
+    right, without = fitter.fit([Term(play, frozenset())], steps=0), fitter.fit([])
+    assert not denied(fitter, right, without)
