@@ -5,6 +5,7 @@ What is really missing shows in both. What one of them was bent to fit does not 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,23 +13,27 @@ import numpy as np
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.replicate import replicate
+from rtcomp.diagnosis.significance import SURE
 from rtcomp.diagnosis.windows import GROUPS, Windows
 from rtcomp.kernels import Floats
 
 HALF = 0.5
 """Part of what an effect does below which nothing at all is the better guess."""
+TURNS = 30
+"""Turns of the robust fit."""
+NOTHING = 1e-12
+"""Part of the squared errors below which what an effect does is lost in rounding."""
 
 
 def denied(fitter: Fitter, model: Fitted, without: Fitted) -> bool:
     """Tell whether what `model` does beyond the one `without` does not show in the other objective.
 
-    Only where it would if `model` were right: it is compared with what shows in a replicate. Where noise of
-    the reading kicks a load within its play, there is nothing to compare.
+    Only where it would if `model` were right, as a replicate of it tells: behind a play, noise of the reading
+    kicks the load another way each time, and the right model does not show.
     """
     balance = fitter.balance
     windows = Windows.of(balance) if fitter.by_force else None
-    shown = shows(*(errors(fitter, m, windows) for m in (model, without)))
-    if shown >= HALF:
+    if _more_than_half(*(errors(fitter, m, windows) for m in (model, without))):
         return False
     stage = fitter.stage(model, between=True)
     motion = [path.x for path in balance.paths()]
@@ -38,21 +43,35 @@ def denied(fitter: Fitter, model: Fitted, without: Fitted) -> bool:
     other = fitter.on(data)
     same = windows and windows.on(other.balance)
     again = [other.fit(list(m.terms), m, steps=0) for m in (model, without)]
-    return shown < HALF * shows(*(errors(other, m, same) for m in again))
+    return _more_than_half(*(errors(other, m, same) for m in again))
 
 
-def shows(having: Sequence[Floats], without: Sequence[Floats]) -> float:
-    """Return the part of what a model does beyond another one that the errors of both, each (rows,), show.
+def _more_than_half(having: Sequence[Floats], without: Sequence[Floats]) -> bool:
+    part, error = shows(having, without)
+    return part - SURE * error > HALF
 
-    1 where all of it does, 0 where nothing does, about a half where errors are much larger than it. It is the
-    least-squares factor, over windows or blocks that count alike: one that went far off says no more.
+
+def shows(having: Sequence[Floats], without: Sequence[Floats]) -> tuple[float, float]:
+    """Return the part of what a model does beyond another one that their errors show, and its standard error.
+
+    Errors are one array (rows,) for each window or block. 1 where all of it is there, 0 where nothing is. The
+    factor of a robust fit: windows that went further off than half of them count by their size, not by its
+    square (Huber 1964, Ann. Math. Stat. 35(1)).
     """
-    there = done = 0.0
-    for own, other in zip(having, without, strict=True):
-        size = max(float(np.mean(own**2) + np.mean(other**2)), 1e-300)
-        there += float(np.sum(other * (other - own))) / size
-        done += float(np.sum((other - own) ** 2)) / size
-    return there / max(done, 1e-300)
+    done = [other - own for own, other in zip(having, without, strict=True)]
+    square = np.array([float(np.sum(d**2)) for d in done])
+    along = np.array([float(np.sum(e * d)) for e, d in zip(without, done, strict=True)])
+    whole = np.array([float(np.sum(e**2)) for e in without])
+    if square.sum() <= NOTHING * whole.sum():
+        return 0.0, math.inf
+    part, weight, least = 1.0, np.ones(square.size), math.sqrt(NOTHING * (whole + square).mean())
+    for _ in range(TURNS):
+        off = np.sqrt(np.maximum(whole - 2.0 * part * along + part**2 * square, 0.0))
+        usual = max(float(np.median(off)), least)
+        weight = 1.0 / np.maximum(off, usual)
+        part = float(np.sum(weight * along) / max(np.sum(weight * square), 1e-300))
+    scatter = np.sum((weight * (along - part * square)) ** 2) * square.size / max(square.size - 1, 1)
+    return part, float(np.sqrt(scatter) / max(np.sum(weight * square), 1e-300))
 
 
 def errors(fitter: Fitter, model: Fitted, windows: Windows | None) -> list[Floats]:

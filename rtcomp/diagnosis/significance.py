@@ -10,7 +10,7 @@ import numpy as np
 from rtcomp.kernels import Floats
 
 SURE = 2.0
-"""Standard errors of the moments of a sample by which a value must be away from the level to be plain."""
+"""Standard errors by which a value must be away from what it is compared with to be plain."""
 MEAN, KURTOSIS = 0.5772156649, 5.4
 """Of Gumbel's law: its mean over its scale, its fourth moment over its variance squared."""
 

@@ -132,7 +132,7 @@ def test_an_effect_is_doubted_where_much_is_left_beside_it(bump: float, doubted:
 def test_no_effect_is_doubted_for_what_makes_the_form_of_another_one() -> None:
     wave = {"name": "cogging", "amplitude": 0.2, "period": 3e-4, "phase": 0.4}
     second = {"name": "cogging", "amplitude": 0.15, "period": 1.5e-4, "phase": 1.4}
-    spring = {"name": "parallel-spring", "stiffness": 500.0}
+    spring = {"name": "parallel-spring", "stiffness": 800.0}
     truth = stage(effects=[wave, second, spring])
     balance = ForceBalance(stage(), load_data([run(truth, there_and_back(20.0))]))
     base, fitter = baseline(balance), Fitter(balance)
