@@ -1,6 +1,7 @@
-"""What the other objective says of a model: simulated position where forces judged, or forces.
+"""Whether an effect shows in the objective that its model was not fitted to.
 
-What is really missing shows in both. What one of them was bent to fit does not show in the other.
+A model fitted to forces is asked in simulated positions, one fitted to positions in forces. What is really
+missing shows in both; what one of them was bent to fit does not show in the other.
 """
 
 from __future__ import annotations
