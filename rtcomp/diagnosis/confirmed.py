@@ -18,8 +18,8 @@ from rtcomp.diagnosis.significance import SURE
 from rtcomp.diagnosis.windows import GROUPS, Windows
 from rtcomp.kernels import Floats
 
-HALF = 0.5
-"""Part of what an effect does below which nothing at all is the better guess."""
+LEAST, MOST = 0.5, 1.5
+"""Part of what an effect does below which nothing at all is the better guess, above which twice as much is."""
 TURNS = 30
 """Turns of the robust fit."""
 NOTHING = 1e-12
@@ -34,7 +34,7 @@ def denied(fitter: Fitter, model: Fitted, without: Fitted) -> bool:
     """
     balance = fitter.balance
     windows = Windows.of(balance) if fitter.by_force else None
-    if _more_than_half(*(errors(fitter, m, windows) for m in (model, without))):
+    if there(*(errors(fitter, m, windows) for m in (model, without))):
         return False
     stage = fitter.stage(model, between=True)
     motion = [path.x for path in balance.paths()]
@@ -44,12 +44,16 @@ def denied(fitter: Fitter, model: Fitted, without: Fitted) -> bool:
     other = fitter.on(data)
     same = windows and windows.on(other.balance)
     again = [other.fit(list(m.terms), m, steps=0) for m in (model, without)]
-    return _more_than_half(*(errors(other, m, same) for m in again))
+    return there(*(errors(other, m, same) for m in again))
 
 
-def _more_than_half(having: Sequence[Floats], without: Sequence[Floats]) -> bool:
+def there(having: Sequence[Floats], without: Sequence[Floats]) -> bool:
+    """Tell whether the part that shows is plainly more than nothing, and nearer to all of it than to nothing.
+
+    Where plainly more than all of it is there, something else is.
+    """
     part, error = shows(having, without)
-    return part - SURE * error > HALF
+    return part > max(LEAST, SURE * error) and part - SURE * error < MOST
 
 
 def shows(having: Sequence[Floats], without: Sequence[Floats]) -> tuple[float, float]:

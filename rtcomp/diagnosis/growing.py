@@ -43,7 +43,7 @@ def grow(
     if behind and not model.terms and _unexplained(fitter, model, found):
         terms = [one for term in behind.values() for one in scanned_widely(fitter, model, term, ends)]
         found += fitted_in_time(fitter, model, terms, ends)
-    return [*found, *fitted_in_time(fitter, model, _in_better_form(fitter, found, ends), ends)]
+    return [*found, *fitted_in_time(fitter, model, in_better_form(fitter, found, ends), ends)]
 
 
 def _unexplained(fitter: Fitter, model: Fitted, grown: Sequence[Fitted]) -> bool:
@@ -53,7 +53,7 @@ def _unexplained(fitter: Fitter, model: Fitted, grown: Sequence[Fitted]) -> bool
     return there > TOLERANCE and all(each**2 > LEFT * there**2 for each in left)
 
 
-def _in_better_form(fitter: Fitter, found: Sequence[Fitted], ends: float) -> list[Term]:
+def in_better_form(fitter: Fitter, found: Sequence[Fitted], ends: float) -> list[Term]:
     """Return the last terms in another form, where that leaves less at the same values."""
 
     def better_than(larger: Fitted, term: Term) -> bool:

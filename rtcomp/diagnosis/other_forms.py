@@ -74,11 +74,15 @@ def _quarters(fitter: Fitter, model: Fitted, kind: type[Effect], wave: Entry, ph
 
 
 def errors_beside(fitter: Fitter, model: Fitted, forms: Floats) -> Floats:
-    """Return the squared errors (B_use,) of blocks left out, with other forms (q, n) beside a model."""
+    """Return the squared errors (B_use,) of blocks left out, with other forms (q, n) beside a model.
+
+    Or without them, where these predict no better: a form that is fitted to noise explains nothing.
+    """
     if not forms.size:
         return model.errors
     _, joint, prior, whole = _beside(fitter, model, forms)
-    return left_out(joint, fitter.use, prior, model.variance, whole)[0]
+    found = left_out(joint, fitter.use, prior, model.variance, whole)[0]
+    return min(model.errors, found, key=lambda errors: float(np.log(errors).sum()))
 
 
 def in_any_form(fitter: Fitter, model: Fitted, forms: Floats) -> Fitted:

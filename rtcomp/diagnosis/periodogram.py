@@ -58,3 +58,17 @@ def highest(n: Floats, power: Floats, peaks: int, same: float = 0.0) -> list[flo
         left[max(at - BESIDE, 0) : at + BESIDE + 1] = 0.0
         left[np.abs(np.log(n / n[at])) < same] = 0.0
     return found
+
+
+def peak_near(frequency: float, step: float, time: Floats, values: Floats) -> float:
+    """Return the frequency (Hz), within a `step` of one, of which `values` (K,) at `time` (s, (K,)) have most.
+
+    Between the frequencies of a transform a line over a long time is weaker than its neighbours of a gap.
+    """
+    from scipy.optimize import minimize_scalar
+
+    def power(at: float) -> float:
+        return -float(abs(np.exp(-2j * np.pi * at * time) @ values))
+
+    near = (frequency - step, frequency + step)
+    return float(minimize_scalar(power, bounds=near, method="bounded", options={"xatol": 1e-2 * step}).x)

@@ -16,6 +16,8 @@ from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
+from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.growing import in_better_form
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.result import Diagnosis, Place
@@ -174,6 +176,15 @@ def _left(balance: ForceBalance, model: Fitted) -> float:
     return float(np.mean(np.log(model.errors / balance.power)))
 
 
+def least_left(fitter: Fitter, terms: Sequence[Term], ends: float) -> float:
+    """Return the logarithm of what effects leave, the last of them in the form that suits this objective."""
+    settle(fitter, terms)
+    same = fitter.fit(terms)
+    forms = in_better_form(fitter, [same], ends) if terms else []
+    models = [same, *(fitter.fit([*terms[:-1], form], same) for form in forms)]
+    return min(_left(fitter.balance, model) for model in models)
+
+
 def _searched(
     objectives: Sequence[Objective], ends: float, say: Progress, seed: int
 ) -> tuple[Fitter, Search]:
@@ -185,11 +196,8 @@ def _searched(
 
     def doubted(model: Fitted) -> bool:
         other = Fitter(objectives[1].balance)
-        left = []
-        for terms in (model.terms, model.terms[:-1]):
-            settle(other, terms)
-            left.append(_left(other.balance, other.fit(terms)))
-        return min(left) < _left(best.balance, model)
+        left = min(least_left(other, terms, ends) for terms in (model.terms, model.terms[:-1]))
+        return left < _left(best.balance, model)
 
     doubt = doubted if len(objectives) > 1 else None
     found = search(best.fitter, best.base, ends, say, seed, doubt, best.first)

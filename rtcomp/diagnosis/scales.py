@@ -17,7 +17,7 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
-from rtcomp.diagnosis.periodogram import highest, periodogram
+from rtcomp.diagnosis.periodogram import highest, peak_near, periodogram
 from rtcomp.diagnosis.where import as_white
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Parameter
@@ -143,14 +143,15 @@ def tones_of(balance: ForceBalance, residual: Floats) -> Floats:
     rate, segments = balance.data.rate, balance.data.segments
     times = [s.time[balance.whitening.rows(s)] for s in segments]
     at = np.round((np.concatenate(times) - min(t[0] for t in times)) * rate).astype(np.int64)
-    line = np.bincount(at, residual * np.concatenate([np.hanning(t.size) for t in times]))
+    faded = residual * np.concatenate([np.hanning(t.size) for t in times])
+    line = np.bincount(at, faded)
     count = scipy.fft.next_fast_len(2 * line.size, real=True)
     power = np.abs(scipy.fft.rfft(line, count)) ** 2
     frequency = np.asarray(np.arange(power.size) * (rate / count), dtype=np.float64)
     slow, fast = rate / line.size, rate / balance.whitening.thinning
     some = (frequency > 3.0 * slow) & (frequency < 0.45 * fast)
     lines: list[float] = highest(frequency[some], np.asarray(power[some], dtype=np.float64), PEAKS + 2, 0.01)
-    return np.sort(np.array(lines))
+    return np.sort([peak_near(one, rate / count, at / rate, faded) for one in lines])
 
 
 def _moments(balance: ForceBalance, residual: Floats) -> Floats:

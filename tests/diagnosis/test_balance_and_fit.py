@@ -19,7 +19,7 @@ from rtcomp.diagnosis.candidates import candidates, started
 from rtcomp.diagnosis.data import MOST_ROWS, load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.other_forms import overtones
+from rtcomp.diagnosis.other_forms import errors_beside, overtones
 from rtcomp.diagnosis.regression import Grams
 from rtcomp.diagnosis.replicate import replicate
 from rtcomp.diagnosis.scales import tones_of
@@ -200,6 +200,18 @@ def test_another_form_of_a_wave_has_its_overtones_and_no_other_waves(name: str) 
     assert left(1.002 * 0.5e-4) < 0.3
     assert left(2.0e-4) < 0.03
     assert left(0.77e-4) > 0.8
+
+
+def test_other_forms_beside_a_model_do_not_make_it_a_poorer_one() -> None:
+    """What is fitted to noise predicts blocks left out worse: no further effect is better for that."""
+    believed = stage()
+    balance = ForceBalance(believed, load_data([run(believed, there_and_back(20.0))]))
+    fitter, fitted = Fitter(balance), baseline(balance)
+    random = np.random.default_rng(3)
+    some = 100.0 * random.standard_normal((20, fitted.residual.size))
+    assert np.all(errors_beside(fitter, fitted, some) == fitted.errors)
+    some[0] = fitted.residual + 0.3 * np.std(fitted.residual) * random.standard_normal(fitted.residual.size)
+    assert np.log(errors_beside(fitter, fitted, 100.0 * some[:1])).mean() < np.log(fitted.errors).mean() - 1.0
 
 
 def test_what_was_made_of_a_recording_goes_with_it() -> None:

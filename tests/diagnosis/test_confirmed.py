@@ -10,7 +10,7 @@ from recorded import run, stage, there_and_back
 from test_trajectory import LOAD, balanced, both
 from test_trajectory import stage as pendulum
 
-from rtcomp.diagnosis.confirmed import denied, errors, shows
+from rtcomp.diagnosis.confirmed import denied, errors, shows, there
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.trajectory import Trajectory
@@ -44,6 +44,16 @@ def test_a_window_that_went_far_off_says_no_more_than_others(seed: int) -> None:
     rest[3] *= 1e4
     found, error = shows(list(rest), list(done + rest))
     assert found == pytest.approx(1.0, abs=0.2) and error < 0.2
+
+
+@pytest.mark.parametrize(("part", "rest", "whether"), [(1.0, 3.0, True), (0.0, 3.0, False), (0.4, 0.1, False),
+                                                       (2.0, 0.1, False), (1.0, 300.0, False)])  # fmt: skip
+def test_an_effect_is_there_by_what_shows_of_it(part: float, rest: float, whether: bool) -> None:
+    """Not where less than half or twice as much shows, nor where it may be nothing; else errors may hide it."""
+    random = np.random.default_rng(5)
+    done = random.standard_normal((40, 20))
+    others = rest * random.standard_normal((40, 20)) + part * done
+    assert there(list(others - done), list(others)) == whether
 
 
 def test_what_does_nothing_shows_nothing() -> None:

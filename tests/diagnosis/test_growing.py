@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,6 +16,7 @@ from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.growing import grow
+from rtcomp.diagnosis.pipeline import least_left
 from rtcomp.diagnosis.selection import look
 from rtcomp.diagnosis.starting import STARTS, as_they_are
 
@@ -35,6 +37,10 @@ def test_an_effect_is_grown_in_the_form_that_it_has(following: float) -> None:
     assert best["name"] == "frictional-lag"
     assert best["following"] == following
     assert best["time_constant"] == pytest.approx(late["time_constant"], rel=0.1)
+    # Where another way to take the command had it in the other form, this one still finds its own.
+    other = Term.of({**best, "following": 1.0 - following})
+    own = float(np.mean(np.log(min(grown, key=lambda model: model.sse).errors / balance.power)))
+    assert least_left(fitter, [other], math.inf) == pytest.approx(own, abs=0.3)
 
 
 @given(st.lists(st.lists(st.floats(0.0, 9.0), min_size=1, max_size=4), max_size=6))

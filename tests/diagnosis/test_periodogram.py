@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtcomp.diagnosis.periodogram import FINE, periodogram
+from rtcomp.diagnosis.periodogram import FINE, peak_near, periodogram
 
 
 @settings(max_examples=20, deadline=None)
@@ -32,3 +32,12 @@ def test_the_wave_that_is_there_stands_out() -> None:
     x = 1e-3 * np.sin(np.arange(20_000) * 0.003)
     number, power = periodogram(x, 2e-3, np.ones_like(x), np.cos(2 * np.pi * x / 1.3e-4), 100.0)
     assert number[np.argmax(power)] == pytest.approx(2e-3 / 1.3e-4, abs=1.0 / FINE)
+
+
+@given(st.floats(1.0, 20.0), st.floats(-1.0, 1.0), st.integers(0, 1000))
+def test_a_tone_is_found_between_the_lines_of_a_transform(tone: float, off: float, seed: int) -> None:
+    """In short windows with long gaps between them its neighbours are nearly as strong."""
+    time = np.concatenate([first + np.arange(0.0, 2.2, 0.01) for first in (0.0, 6.7, 13.4, 20.1)])
+    values = np.cos(2 * np.pi * tone * time + 0.1 * seed)
+    step = 0.5 / (time[-1] - time[0])
+    assert peak_near(tone + off * step, step, time, values) == pytest.approx(tone, abs=0.15 * step)
