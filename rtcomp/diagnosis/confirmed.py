@@ -19,7 +19,7 @@ from rtcomp.diagnosis.windows import GROUPS, Windows
 from rtcomp.kernels import Floats
 
 LEAST, MOST = 0.5, 1.5
-"""Part of what an effect does below which nothing at all is the better guess, above which twice as much is."""
+"""Part of what an effect does below which nothing is the better guess, above which twice as much is."""
 TURNS = 30
 """Turns of the robust fit."""
 NOTHING = 1e-12

@@ -61,7 +61,7 @@ def highest(n: Floats, power: Floats, peaks: int, same: float = 0.0) -> list[flo
 
 
 def peak_near(frequency: float, step: float, time: Floats, values: Floats) -> float:
-    """Return the frequency (Hz), within a `step` of one, of which `values` (K,) at `time` (s, (K,)) have most.
+    """Return the frequency (Hz), within a `step`, of which `values` (K,) at `time` (s, (K,)) have most.
 
     Between the frequencies of a transform a line over a long time is weaker than its neighbours of a gap.
     """

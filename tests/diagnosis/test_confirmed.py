@@ -49,7 +49,7 @@ def test_a_window_that_went_far_off_says_no_more_than_others(seed: int) -> None:
 @pytest.mark.parametrize(("part", "rest", "whether"), [(1.0, 3.0, True), (0.0, 3.0, False), (0.4, 0.1, False),
                                                        (2.0, 0.1, False), (1.0, 300.0, False)])  # fmt: skip
 def test_an_effect_is_there_by_what_shows_of_it(part: float, rest: float, whether: bool) -> None:
-    """Not where less than half or twice as much shows, nor where it may be nothing; else errors may hide it."""
+    """Not where less than half or twice as much shows, nor where it may be nothing; else it is."""
     random = np.random.default_rng(5)
     done = random.standard_normal((40, 20))
     others = rest * random.standard_normal((40, 20)) + part * done
