@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -22,7 +23,7 @@ from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.result import Diagnosis, Place
 from rtcomp.diagnosis.selection import LOOKED, Look, Search, look, search, until
-from rtcomp.diagnosis.settings import BUDGET
+from rtcomp.diagnosis.settings import BUDGET, LEAST_GAIN
 from rtcomp.diagnosis.sticking import hides, part_untold, sticks
 from rtcomp.diagnosis.trajectory import Trajectory
 from rtcomp.diagnosis.validation import Reserved
@@ -185,6 +186,16 @@ def least_left(fitter: Fitter, terms: Sequence[Term], ends: float) -> float:
     return min(_left(fitter.balance, model) for model in models)
 
 
+def outdone(first: float, own: float, same: float, fewer: float) -> bool:
+    """Tell whether a model does worse than the other way to take the command, by logarithms of what is left.
+
+    It leaves `own` of what there was at `first`; the other way `same` with its effects, `fewer` without the
+    last. Where this one does not matter against the other way without it, it only makes up for the way.
+    """
+    rms = [math.exp(0.5 * left) for left in (first, own, fewer)]
+    return same < own or rms[2] - rms[1] <= LEAST_GAIN * rms[0]
+
+
 def _searched(
     objectives: Sequence[Objective], ends: float, say: Progress, seed: int
 ) -> tuple[Fitter, Search]:
@@ -196,8 +207,9 @@ def _searched(
 
     def doubted(model: Fitted) -> bool:
         other = Fitter(objectives[1].balance)
-        left = min(least_left(other, terms, ends) for terms in (model.terms, model.terms[:-1]))
-        return left < _left(best.balance, model)
+        own, first = _left(best.balance, model), _left(best.balance, best.base)
+        same, fewer = (least_left(other, terms, ends) for terms in (model.terms, model.terms[:-1]))
+        return outdone(first, own, same, fewer)
 
     doubt = doubted if len(objectives) > 1 else None
     found = search(best.fitter, best.base, ends, say, seed, doubt, best.first)
