@@ -10,12 +10,15 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import ForceBalance, System
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.free import Term
+from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
 STIFFER = 1.01
 """Times its stiffness by which the whole of friction is made stiffer, to see what asks for that."""
 CONSISTENT = 0.02
 """Part of its level by which friction may be away from that which its columns were made for."""
+HUGE = 1e150
+"""Size of a column beyond which its square is no number."""
 
 
 def goes_by_whole(balance: ForceBalance, entries: Sequence[Entry]) -> bool:
@@ -35,15 +38,23 @@ def system_around(
 
     The stiffness of the whole is the sum of the units'. So what asks for it changes with each unit's alike,
     and a fine one, which hardly holds a force, would be free to move it: this is part of their columns.
+    Raises ConfigError where a force grows beyond all bounds.
     """
     system, stiffness = balance.system(entries, weights), float(weights.sum())
     if around is None or stiffness <= 0.0 or not goes_by_whole(balance, entries):
-        return system
+        return _bounded(system)
     change = balance.error(entries, around, weights) - balance.error(entries, around, weights, STIFFER)
     change /= (STIFFER - 1.0) * stiffness
     columns = system.columns.copy()
     columns[balance.friction] += change
-    return System(system.y + stiffness * change, columns, system.of_entry)
+    return _bounded(System(system.y + stiffness * change, columns, system.of_entry))
+
+
+def _bounded(system: System) -> System:
+    most = max(float(np.abs(part).max(initial=0.0)) for part in (system.columns, system.y))
+    if not most < HUGE:
+        raise ConfigError(f"a force of {most:g} times the noise on the recorded motion is no stage's")
+    return system
 
 
 def consistent(balance: ForceBalance, made_for: Floats, weights: Floats) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -269,17 +270,16 @@ class Fitter:
             gained, tangents = 1.0 - found[-1] / sse, None
             current, made_for = trial, weights
             system, prior, _grams, c, sse = found
-            weights = c[b.friction]
-            variance = sse / count
+            weights, variance = c[b.friction], sse / count
             damping = max(0.1 * damping, 1e-6)
             free = free_of(current, b)
             if gained < SETTLED:
                 break
         turns = TURNS if goes_by_whole(b, entries) else 0
-        while turns > 0 and not consistent(b, made_for, weights):
-            made_for, turns, tangents = weights, turns - 1, None
-            system, prior, _, c, sse = self.solve(current, made_for, variance, c)
-            weights = c[b.friction]
+        with suppress(ConfigError):  # where it grows beyond all bounds, it stays as it was
+            while turns > 0 and not consistent(b, made_for, weights):
+                system, prior, _, c, sse = self.solve(current, weights, variance, c)
+                made_for, weights, turns, tangents = weights, c[b.friction], turns - 1, None
         if tangents is None:
             tangents = self._tangents(current, free, system, c, weights)
         done = self._finished(current, free, system, prior, c, tangents, sse, variance, weights)

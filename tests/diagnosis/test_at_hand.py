@@ -7,11 +7,13 @@ import pytest
 from recorded import run, stage, there_and_back
 
 from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.at_hand import system_around
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import baseline
 from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
+from rtcomp.errors import ConfigError
 from rtcomp.physics import Place, catalogue
 
 CREEP = {"name": "creep", "fraction": 0.7, "time_constant": 0.15}
@@ -36,6 +38,15 @@ def test_a_strong_creep_is_fitted_from_anywhere(fitter: Fitter, start: float) ->
     assert creep["fraction"] / found.weights.sum() == pytest.approx(CREEP["fraction"] / stiffness, rel=0.1)
     true = fitter.balance.error(found.entries, found.coefficients, found.weights)
     assert np.sum(true[fitter.rows] ** 2) == pytest.approx(found.sse, rel=0.02)
+
+
+@pytest.mark.filterwarnings("error")
+def test_friction_that_grows_beyond_all_bounds_is_refused(fitter: Fitter) -> None:
+    """It is an error that ends a candidate, not a number that spoils the sums of the others."""
+    around = fitter.fit([Term.of(CREEP)])
+    huge = np.full_like(around.weights, 1e152)
+    with pytest.raises(ConfigError, match="times the noise"):
+        system_around(fitter.balance, around.entries, huge, 1e152 * around.coefficients)
 
 
 def _at_work() -> list[dict[str, object]]:
