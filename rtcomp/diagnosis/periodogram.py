@@ -1,4 +1,4 @@
-"""How much of a residual is a wave along the position, for many periods at once."""
+"""How much of a residual is a wave along the position, for many periods at once; peaks, in time too."""
 
 from __future__ import annotations
 
