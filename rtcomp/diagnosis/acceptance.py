@@ -31,7 +31,7 @@ def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, e
     """
     if null is None or model.at_bound:
         return False
-    forms = fitter.other_forms(parent)
+    forms = fitter.other_forms(parent, str(model.terms[-1].entry["name"]))
     before, after = errors_beside(fitter, parent, forms), errors_beside(fitter, model, forms)
     p = null.p_value(log_gain(before, after))
     gained = math.sqrt(before.sum()) - math.sqrt(after.sum())

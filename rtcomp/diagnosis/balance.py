@@ -101,7 +101,7 @@ class ForceBalance(Signals):
         force = path.measured * c[0] + units @ c[1 : self.friction.stop]
         made = [ent.build(one) for e in self.believed for one in ent.basis(e)]
         for effect, size in zip(made, c[self.size :], strict=True):
-            force += size * self._force_of(effect, segment, path)
+            force += size * self.force_of(effect, segment, path)
         return np.asarray(force)
 
     def _cut_blocks(self) -> None:

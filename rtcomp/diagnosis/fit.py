@@ -26,7 +26,7 @@ from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitted import Fitted, left_out
 from rtcomp.diagnosis.free import Free, Term, free_of
 from rtcomp.diagnosis.noise import Noise
-from rtcomp.diagnosis.other_forms import other_forms, overtones
+from rtcomp.diagnosis.other_forms import other_beliefs, other_forms, overtones
 from rtcomp.diagnosis.regression import Grams, Prior
 from rtcomp.diagnosis.result import PositionFit
 from rtcomp.diagnosis.retuned import level_and_reach
@@ -116,17 +116,17 @@ class Fitter:
         c = np.delete(model.coefficients, np.arange(span.start, span.stop))
         return as_force(b, b.error(others, c, model.weights))
 
-    def other_forms(self, model: Fitted) -> Floats:
-        """Return the columns (q, n) of what other forms of a model's effects would do beside it."""
+    def other_forms(self, model: Fitted, besides: str) -> Floats:
+        """Return the columns (q, n) of what other forms of its effects do, but of that which is `besides`."""
 
         def made() -> list[Floats]:
             left, count = self.force(model), len(model.terms)
-            found = [other_forms(self.balance, self.without(model, i) - left) for i in range(count)]
+            forces = [self.without(model, i) - left for i in range(count)]
+            found = [other_forms(self.balance, *one) for one in zip(model.entries, forces, strict=True)]
             found += [self.overtones(model, i) for i in range(count)]
             return [np.concatenate([np.zeros((0, left.size)), *found])]
 
-        found: Floats = self._forms.of(model, made)[0]
-        return found
+        return np.concatenate([other_beliefs(self.balance, model, besides), *self._forms.of(model, made)])
 
     def overtones(self, model: Fitted, at: int) -> Floats:
         """Return the columns (q, n) that another form of its effect number `at`, if a wave, would add."""

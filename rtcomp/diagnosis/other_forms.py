@@ -2,7 +2,8 @@
 
 The kernels of the catalogue are not the only forms that an effect may have. Where its form is another, its
 force times a smooth function of position, speed, time or of itself makes up for most of it, and for a wave
-the same over a period. What only does the same is no further effect.
+the same over a period. A force that is a smooth function of position may be any other one. What only does the
+same is no further effect.
 """
 
 from __future__ import annotations
@@ -27,17 +28,68 @@ if TYPE_CHECKING:
 
 OTHERS = (1 / 2, 1 / 3, 2.0, 2 / 3)
 """Periods of a wave's other harmonics, over the one that was found: the first or the second of them."""
+KNOTS = 6
+"""Knots over the stroke of splines that tell a smooth function of position: a wave that is there three times
+is none."""
+SMOOTH = 0.05
+"""Part (rms) of a force that they may leave of it."""
 LONGER = 0.02
 """Step of the derivative by the period, in waves over the stroke: a period that was fitted without overtones
 is biased."""
 
 
-def other_forms(balance: ForceBalance, force: Floats) -> Floats:
+def other_forms(balance: ForceBalance, entry: Entry, force: Floats) -> Floats:
     """Return the whitened columns (q, n) of an entry's `force` (N, (n,)), bent by functions of size 1."""
     most = float(np.abs(force).max(initial=0.0))
     if not np.isfinite(most) or most == 0.0:
         return np.zeros((0, force.size))
+    others = of_position(balance, entry)
+    if others.size:
+        return others
     return np.array([as_white(balance, force * bend) for bend in _bends(balance, force / most)])
+
+
+def of_position(balance: ForceBalance, entry: Entry) -> Floats:
+    """Return the whitened columns (q, n) of any other function of position, where an entry's force is one.
+
+    As large as the force, and without a constant; none where the force is no smooth function of position.
+    """
+    if not ent.adds_force(ent.kind_of(entry)):
+        return np.zeros((0, balance.block.size))
+    effect, pairs = ent.build(entry), zip(balance.data.segments, balance.paths(), strict=True)
+    force = balance.plain([balance.force_of(effect, segment, path) for segment, path in pairs])
+    position = balance.plain([p.x for p in balance.paths()])
+    size, splines = float(np.sqrt(np.mean(force**2))), _natural_splines(position)
+    rest = force - (force @ splines.T) @ splines / position.size
+    if size == 0.0 or not float(np.sqrt(np.mean(rest**2))) < SMOOTH * size:
+        return np.zeros((0, force.size))
+    return np.array([as_white(balance, size * each) for each in splines[1:]])
+
+
+def _natural_splines(position: Floats) -> Floats:
+    """Return functions (KNOTS, n) that span natural cubic splines of a position (n,), of unit rms.
+
+    Orthogonal, the first a constant (Hastie, Tibshirani, Friedman 2009, The Elements of Statistical Learning,
+    section 5.2.1).
+    """
+    low, high = float(position.min()), float(position.max())
+    at, knots = (position - low) / max(high - low, 1e-300), np.linspace(0.0, 1.0, KNOTS)
+    cubes = np.maximum(at - knots[:, None], 0.0) ** 3
+    bent = (cubes[:-1] - cubes[-1]) / (1.0 - knots[:-1, None])
+    span = np.array([np.ones_like(at), at, *(bent[:-1] - bent[-1])])
+    return np.asarray(np.sqrt(position.size) * np.linalg.qr(span.T)[0].T)
+
+
+def other_beliefs(balance: ForceBalance, model: Fitted, besides: str) -> Floats:
+    """Return the columns (q, n) of other functions of position than those believed, but of effect `besides`.
+
+    That one is the other form: a spring that hardens beside a belief of a linear one is told by its name.
+    """
+    found = [np.zeros((0, model.residual.size))]
+    for entry, span in zip(balance.believed, model.system.of_entry, strict=False):
+        if entry["name"] != besides and span.stop > span.start:
+            found.append(of_position(balance, ent.composed(entry, model.coefficients[span])))
+    return np.concatenate(found)
 
 
 def overtones(fitter: Fitter, model: Fitted, entry: Entry) -> Floats:

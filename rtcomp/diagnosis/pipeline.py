@@ -199,9 +199,10 @@ def outdone(first: float, own: float, same: float, fewer: float) -> bool:
 def _searched(
     objectives: Sequence[Objective], ends: float, say: Progress, seed: int
 ) -> tuple[Fitter, Search]:
-    """Return the search on the first objective, or on the second where a model found fits better there.
+    """Return the search on the first objective, or on the second where that explains more.
 
     What is missing may hide which way the command goes between rows, and the wrong way looks like a delay.
+    The other is searched where a model found fits better there, or where the first leaves more than noise.
     """
     best = objectives[0]
 
@@ -213,8 +214,13 @@ def _searched(
 
     doubt = doubted if len(objectives) > 1 else None
     found = search(best.fitter, best.base, ends, say, seed, doubt, best.first)
-    if not found.doubted:
+    told = not Rest.of(best.fitter, found).significant
+    if doubt is None or (not found.doubted and (told or time.monotonic() > ends)):
         return best.fitter, found
     fitter = Fitter(objectives[1].balance)
     settle(fitter)
-    return fitter, search(fitter, with_offset(fitter, fitter.fit([])), ends, say, seed)
+    other = search(fitter, with_offset(fitter, fitter.fit([])), ends, say, seed)
+    if found.doubted or not Rest.of(fitter, other).significant:
+        return fitter, other
+    left = [_left(one.balance, by.chosen) for one, by in ((best.fitter, found), (fitter, other))]
+    return (fitter, other) if left[1] < left[0] else (best.fitter, found)

@@ -116,7 +116,7 @@ class Signals:
         """Take `speed` (m/s) as that below which micro-damping acts."""
         self.stage = self.stage.with_changes(stage={"micro_damping_speed": speed})
 
-    def _force_of(self, effect: Effect, segment: Segment, path: Path) -> Floats:
+    def force_of(self, effect: Effect, segment: Segment, path: Path) -> Floats:
         """Return the force (N, (K,)) that the motion needs for an effect that adds one."""
         given = self._given(segment)
         f = forces(self.stage, [effect], segment.time, path.x, path.v, path.a, given, self.grain)
@@ -307,7 +307,7 @@ class Signals:
 
         def made() -> list[Floats]:
             pairs = zip(self.data.segments, self.driven(sensors, load), strict=True)
-            return [self._force_of(effect, s, p) for s, p in pairs]
+            return [self.force_of(effect, s, p) for s, p in pairs]
 
         return Group(("added", key_of([effect]), key_of(sensors), load.key if load is not None else ()), made)
 

@@ -113,7 +113,7 @@ class Trajectory(Fitter):
         drive, needed = self.balance.both_sides(stage)
         return np.asarray(drive - needed)
 
-    def other_forms(self, model: Fitted) -> Floats:
+    def other_forms(self, model: Fitted, besides: str) -> Floats:
         """Return no columns: what a force does to the position is not in proportion to it."""
         return np.zeros((0, model.residual.size))
 

@@ -25,7 +25,7 @@ from rtcomp.diagnosis.replicate import replicate
 from rtcomp.diagnosis.scales import tones_of
 from rtcomp.diagnosis.stage_of import stage_of
 from rtcomp.diagnosis.validation import Reserved
-from rtcomp.diagnosis.where import as_force
+from rtcomp.diagnosis.where import as_force, as_white
 from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.physics import Effect, catalogue
 from rtcomp.stage.balance import between_rows
@@ -200,6 +200,30 @@ def test_another_form_of_a_wave_has_its_overtones_and_no_other_waves(name: str) 
     assert left(1.002 * 0.5e-4) < 0.3
     assert left(2.0e-4) < 0.03
     assert left(0.77e-4) > 0.8
+
+
+@pytest.mark.parametrize(("waves", "told"), [(0.5, False), (1.0, False), (3.0, True), (4.0, True)])
+def test_another_function_of_position_is_told_from_a_spring_where_it_repeats(
+    waves: float, told: bool
+) -> None:
+    """Within the stroke: else any form of spring may be it, as one that goes by x |x|."""
+    believed = stage(effects=[{"name": "parallel-spring", "stiffness": 2000.0}])
+    balance = ForceBalance(believed, load_data([run(believed, there_and_back(20.0))]))
+    fitter, fitted = Fitter(balance), baseline(balance)
+    forms = fitter.other_forms(fitted, "cogging")
+    position = balance.plain([p.x for p in balance.paths()])
+    low, high = float(position.min()), float(position.max())
+
+    def left(force: np.ndarray) -> float:
+        white = as_white(balance, force)
+        return float(
+            np.linalg.norm(white - np.linalg.lstsq(forms.T, white)[0] @ forms) / np.linalg.norm(white)
+        )
+
+    middle = position - 0.5 * (low + high)
+    assert (left(np.sin(2.0 * np.pi * waves * middle / (high - low))) > 0.2) == told
+    assert left(middle * np.abs(middle)) < 0.03
+    assert not fitter.other_forms(fitted, "parallel-spring").size
 
 
 def test_other_forms_beside_a_model_do_not_make_it_a_poorer_one() -> None:
