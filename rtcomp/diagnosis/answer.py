@@ -120,9 +120,9 @@ def _part(gain: float) -> float:
 
 
 def _z(p: float) -> float:
-    from scipy.stats import norm
+    from scipy.special import ndtri
 
-    return float(norm.isf(min(max(p, 1e-300), 1.0 - 1e-12))) if math.isfinite(p) else math.nan
+    return -float(ndtri(min(max(p, 1e-300), 1.0 - 1e-12))) if math.isfinite(p) else math.nan
 
 
 def _shares(base: Fitted, chosen: Fitted, sets: Sequence[Alternatives]) -> list[float]:

@@ -51,9 +51,9 @@ def system_around(
 
 
 def _bounded(system: System) -> System:
-    most = max(float(np.abs(part).max(initial=0.0)) for part in (system.columns, system.y))
-    if not most < HUGE:
-        raise ConfigError(f"a force of {most:g} times the noise on the recorded motion is no stage's")
+    parts = [part for part in (system.columns, system.y) if part.size]
+    if not all(part.max() < HUGE and part.min() > -HUGE for part in parts):
+        raise ConfigError(f"a force of {HUGE:g} times the noise on the recorded motion is no stage's")
     return system
 
 

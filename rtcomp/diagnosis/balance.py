@@ -10,18 +10,19 @@ by how far the motion stands above the sensor's noise (`noise.Whitening`).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.blocks import reserved_blocks
 from rtcomp.diagnosis.cache import KEPT_ONCE, Cache, Group, key_of
 from rtcomp.diagnosis.data import Data, Segment, reversals
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.noise import Noise, Whitening
 from rtcomp.diagnosis.reaches import MOST_OWN, joined
-from rtcomp.diagnosis.settings import BLOCK_REVERSALS, BLOCK_SECONDS, RESERVED_EVERY
+from rtcomp.diagnosis.settings import BLOCK_REVERSALS, BLOCK_SECONDS
 from rtcomp.diagnosis.signals import BASE, Signals
 from rtcomp.diagnosis.spectrum import filtered, spectrum
 from rtcomp.errors import ConfigError
@@ -79,12 +80,18 @@ class ForceBalance(Signals):
         self.step = step
         self._cache = Cache()
 
-    def on(self, data: Data) -> ForceBalance:
-        """Return the same objective, weights and grid on other data of equal length: a replicate."""
+    def on(self, data: Data, block: np.ndarray | None = None) -> ForceBalance:
+        """Return the same objective, weights and grid on other data of equal length: a replicate.
+
+        Or of another length, with the `block` of each compared row, (n,), of which none is reserved.
+        """
         other = ForceBalance(self.stage, data, self.noise)
         other.reaches, other.step, other.grain = self.reaches, self.step, self.grain
         other._whitening, other.blocks, other.block = self._whitening, self.blocks, self.block
         other._reserved = self._reserved
+        if block is not None:
+            other.blocks, other.block = int(block[-1]) + 1, block
+            other._reserved = np.zeros(other.blocks, dtype=np.bool_)
         other.believed_speed = self.believed_speed
         other._cache = Cache(KEPT_ONCE)
         return other
@@ -116,7 +123,7 @@ class ForceBalance(Signals):
         self._reserved = reserved_blocks(self.blocks, stepped, self._still(), self._furthest())
 
     def _still(self) -> set[int]:
-        """Return the blocks in which the drive's force hardly varies: they could judge nothing."""
+        """Return the blocks in which the drive's force hardly varies: they judge nothing."""
         force = self.drive_force()
         least = LEAST_FORCE * float(np.std(force))
         return {k for k in range(self.blocks) if float(np.std(force[self.block == k])) < least}
@@ -328,22 +335,6 @@ class ForceBalance(Signals):
         assert self._whitening is not None
         pairs = zip(self.data.segments, signals, strict=True)
         return np.concatenate([s[self._whitening.rows(segment)] for segment, s in pairs])
-
-
-def reserved_blocks(count: int, *unlike: Collection[int]) -> np.ndarray:
-    """Return which of `count` blocks are reserved, (count,) bool: of every few the middle one, if it may be.
-
-    Where that is `unlike` the others, the next that is not. Where no block would be left, the last of the
-    reasons does not count.
-    """
-    found = np.zeros(count, dtype=np.bool_)
-    besides = {block for some in unlike for block in some}
-    middle = RESERVED_EVERY // 2
-    for first in range(0, count - middle, RESERVED_EVERY):
-        group = list(range(first, min(first + RESERVED_EVERY, count)))
-        free = [b for b in group[middle:] + group[:middle] if b not in besides]
-        found[free[:1]] = True
-    return found if found.any() or not unlike else reserved_blocks(count, *unlike[:-1])
 
 
 __all__ = ["BASE", "ForceBalance", "System"]

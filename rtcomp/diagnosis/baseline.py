@@ -29,6 +29,10 @@ FINER = 3
 """Times finer they stand around those found, in the second try."""
 SMOOTHED = (1.0, 0.1, 0.01)
 """Parts of the noise's power for which the position is smoothed: each is tried."""
+EARLIER, CLOSE = 4.0, 1.4
+"""Times earlier than an axis seems to, that its friction may yield behind a play; ratio of units there."""
+HARDLY = 0.02
+"""Part of the friction level that the shortest units hold together, which are not counted for that."""
 SLIGHT = 1e-3
 """Part of the friction level below which a unit is not needed."""
 
@@ -139,7 +143,8 @@ def _put_grid(fitter: Fitter, terms: Sequence[Term]) -> None:
     """Put the grid of yield displacements where a model of `terms` has friction.
 
     Stiffnesses that must not be negative come out sparse: of a dense grid, a dozen units are not zero. These
-    are kept beside the believed ones and a coarse grid, so that candidates find friction that can give way.
+    are kept beside the believed ones, a close grid where friction may yield and a coarse one elsewhere, so
+    that candidates find friction that can give way.
     """
     balance = fitter.balance
     coarse = balance.coarse
@@ -147,15 +152,31 @@ def _put_grid(fitter: Fitter, terms: Sequence[Term]) -> None:
     dense, kept = np.geomspace(coarse[0], coarse[-1], DENSE), np.zeros(0)
     for _ in range(2):
         balance.put(dense, step)
-        kept = _needed(balance, fitter.fit(terms, steps=0))
+        fitted = fitter.fit(terms, steps=0)
+        kept, (low, high) = _needed(balance, fitted), yields(balance, fitted)
         step /= FINER
         around = np.exp(np.log(kept)[:, None] + step * np.arange(1 - FINER, FINER)[None, :]).ravel()
         dense = np.unique(around[(around >= coarse[0]) & (around <= coarse[-1])])
         if not kept.size:
             break
-    skeleton = coarse[::2]
+    close = np.exp(np.arange(np.log(low), np.log(high), np.log(CLOSE)))
+    skeleton = np.concatenate([coarse[::2][(coarse[::2] < low) | (coarse[::2] > high)], close])
     far = np.array([not kept.size or np.min(np.abs(np.log(kept / r))) > step * FINER for r in skeleton])
     balance.put(np.concatenate([kept, skeleton[far]]), step * FINER)
+
+
+def yields(balance: ForceBalance, fitted: Fitted) -> tuple[float, float]:
+    """Return the shortest and longest displacement (m) in which friction may yield, also behind a play.
+
+    Equal ones where a fit has no friction.
+    """
+    held = np.cumsum(fitted.coefficients[balance.friction] * balance.reaches)
+    if held[-1] <= 0.0:
+        return float(balance.coarse[0]), float(balance.coarse[0])
+    first, last = (int(np.searchsorted(held, part * held[-1])) for part in (HARDLY, 1.0 - 1e-9))
+    return max(float(balance.reaches[first]) / EARLIER, float(balance.coarse[0])), float(
+        balance.reaches[last]
+    )
 
 
 def _needed(balance: ForceBalance, fitted: Fitted) -> Floats:

@@ -131,10 +131,10 @@ def _after(whole: Segment, rows: slice) -> Segment:
         return part
     gone = np.maximum.accumulate(part.position) - np.minimum.accumulate(part.position)
     far = int(np.searchsorted(gone, FORGOTTEN * float(np.ptp(whole.position))))
-    return replace(part, before=_way(whole.position, rows.start), run_in=min(far, int(RUN_IN * gone.size)))
+    return replace(part, before=way_to(whole.position, rows.start), run_in=min(far, int(RUN_IN * gone.size)))
 
 
-def _way(position: Floats, to: int) -> Floats:
+def way_to(position: Floats, to: int) -> Floats:
     """Return the positions on the way to a row, not more than needed."""
     return position[: to + 1][:: -max(1, position.size // BEFORE)][::-1]
 
@@ -176,7 +176,7 @@ def _windows(segment: Segment, count: int, rows: int) -> list[Segment]:
     return [
         replace(
             segment.part(slice(k, k + rows)),
-            before=np.concatenate([earlier, _way(segment.position, k)]),
+            before=np.concatenate([earlier, way_to(segment.position, k)]),
             run_in=int(RUN_IN * rows) if k else segment.run_in,
         )
         for k in starts.tolist()

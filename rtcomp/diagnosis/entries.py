@@ -16,6 +16,7 @@ import numpy as np
 from rtcomp import physics
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Parameter, Place, catalogue, wires
+from rtcomp.physics.program import Program, run_chain
 
 Entry = dict[str, Any]
 """``{name: ..., parameter: value, ...}``, as a stage file's ``effects`` lists it."""
@@ -91,11 +92,9 @@ def _changes(effect: Effect, other: float = 0.0) -> Floats:
     given[:, [*ADDED, wires.GRIP, wires.GRIP_LEVEL, wires.GRIP_STIFFNESS]] += other
     if other:
         given[:, wires.VOLTS] *= 1.0 + other
-    p, state = np.append(effect.vector(), 0.0), np.append(effect.initial_state(), 0.0)
-    made = np.empty_like(given)
-    for row, out in zip(given, made, strict=True):
-        out[:] = row
-        effect.kernel(p, state, out)
+    program, made = Program([effect]), given.copy()
+    for row in made:
+        run_chain(program.steps, program.p, program.s, row, 0, 1)
     return made - given
 
 

@@ -44,6 +44,8 @@ class Free:
     high: float
     log: bool
     step: float
+    told: bool = True
+    """Whether being as large as it may be is a finding: not so where the recording could not show more."""
 
     def get(self, terms: Sequence[Term]) -> float:
         """Return its value on the scale it is moved on."""
@@ -58,7 +60,7 @@ class Free:
         """Tell whether it is as large or as small as it may be."""
         value = float(terms[self.term].entry[self.name])
         near = AT_BOUND * abs(value)
-        return value >= self.high - near or 0.0 < self.low >= value - near
+        return (self.told and value >= self.high - near) or 0.0 < self.low >= value - near
 
     def put(self, terms: list[Term], value: float) -> None:
         """Give it a value on that scale, within its bounds."""
@@ -96,13 +98,15 @@ def _free_of(terms: Sequence[Term], balance: ForceBalance, *, sizes: bool) -> li
                 # A wave longer than the stroke is a slope by another name.
                 step, most = min(0.02, 0.02 * value / (high - low)), min(p.high, LONGEST * (high - low))
             elif p.unit == "Hz":
-                # Beyond the motion's bandwidth nothing swings that the recording could show.
-                most = min(p.high, balance.noise.bandwidth)
+                # Beyond the motion's bandwidth nothing swings that the recording could show; a stiff contact
+                # is as good as a rigid one, and needs not be shown.
+                most = min(p.high, balance.noise.bandwidth if p.default is None else balance.data.rate)
                 step = min(0.02, 0.01 / (value * balance.data.seconds)) if waves else step
             elif p.unit == "s" and p.name not in (kind.neutral or {}):
                 # A scale shorter than a row is no finding; a size may be as small as it is.
                 least = max(p.lowest, min(balance.data.period, value))
             elif p.unit == "m" and p.lowest < 0.0 and p.name not in kind.linear:
                 step = 0.002 * (high - low)
-            found.append(Free(i, p.name, least, most, log, step))
+            told = p.unit != "Hz" or p.default is None
+            found.append(Free(i, p.name, least, most, log, step, told))
     return found

@@ -8,49 +8,31 @@ from collections.abc import Sequence
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.acceptance import score
 from rtcomp.diagnosis.candidates import Candidate, started
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.scanning import scanned, scanned_widely
+from rtcomp.diagnosis.scanning import scanned
 from rtcomp.diagnosis.screening import Screened
-from rtcomp.diagnosis.settings import FULL_FITS, LEFT, TOLERANCE
+from rtcomp.diagnosis.settings import FULL_FITS
 from rtcomp.errors import ConfigError
 
 
 def grow(
     fitter: Fitter, model: Fitted, made: Sequence[Candidate], screened: Sequence[Screened], ends: float
 ) -> list[Fitted]:
-    """Return the model with each of the best candidates, fitted in full.
-
-    Where the best of them does not explain what the belief leaves, what is behind a play is scanned widely.
-    """
+    """Return the model with each of the best candidates, fitted in full."""
     families: dict[str, list[Term]] = {}
-    gains: dict[str, float] = {}
     for i in np.argsort([-s.gain for s in screened], kind="stable").tolist():
         families.setdefault(made[i].family, []).append(started(made[i], screened[i].sizes))
-        gains.setdefault(made[i].family, screened[i].gain)
-    least = min([*gains.values()][:FULL_FITS], default=0.0)
     terms = fitter.rough(model, list(families.values()), FULL_FITS, ends)
     # First order is no guide to what is behind a play: its own motion is followed from place to place.
     behind = {c.name: c.term for c in made if fitter.by_force and ent.kind_of(c.term.entry).behind}
     terms = [t for t in terms if t.entry["name"] not in behind]
-    for term in behind.values():
-        terms += scanned(fitter, model, term, least, ends)
+    terms += [one for term in behind.values() for one in scanned(fitter, model, term, ends)]
     found = fitted_in_time(fitter, model, terms, ends)
-    if behind and not model.terms and _unexplained(fitter, model, found):
-        terms = [one for term in behind.values() for one in scanned_widely(fitter, model, term, ends)]
-        found += fitted_in_time(fitter, model, terms, ends)
     return [*found, *fitted_in_time(fitter, model, in_better_form(fitter, found, ends), ends)]
-
-
-def _unexplained(fitter: Fitter, model: Fitted, grown: Sequence[Fitted]) -> bool:
-    """Tell whether the best of the larger models leaves more of the force than what explains it would."""
-    there = fitter.above_noise(model)
-    left = [fitter.above_noise(min(grown, key=score))] if grown else []
-    return there > TOLERANCE and all(each**2 > LEFT * there**2 for each in left)
 
 
 def in_better_form(fitter: Fitter, found: Sequence[Fitted], ends: float) -> list[Term]:

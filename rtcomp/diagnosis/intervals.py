@@ -40,11 +40,11 @@ def told(fitter: Fitter, fitted: Fitted) -> list[Told]:
     Blocks of the recording are left out in turn (delete-a-group jackknife: Bell and McCaffrey 2002, Survey
     Methodology 28(2)); what a single block tells is compared with the rest of the recording.
     """
-    from scipy.stats import t as student
+    from scipy.special import stdtrit
 
     balance = fitter.balance
     spans = fitted.system.of_entry[len(balance.believed) :]
-    factor = float(student.ppf(0.975, max(fitted.without.shape[0] - 1, 1)))
+    factor = float(stdtrit(max(fitted.without.shape[0] - 1, 1), 0.975))
     axis = balance.stage.axis
     found = []
     held = _shapes_held(fitter, fitted)
@@ -147,10 +147,10 @@ def _once(fitter: Fitter, fitted: Fitted, at: int, span: slice) -> dict[str, flo
 
 def believed_sizes(fitter: Fitter, fitted: Fitted) -> list[Retuned]:
     """Return the sizes of believed effects that moved, each by more than its 95 % interval."""
-    from scipy.stats import t as student
+    from scipy.special import stdtrit
 
     axis = fitter.balance.stage.axis
-    factor = float(student.ppf(0.975, max(fitted.without.shape[0] - 1, 1)))
+    factor = float(stdtrit(max(fitted.without.shape[0] - 1, 1), 0.975))
     now = fitter.believed_as(fitted, fitted.coefficients)
     others = [fitter.believed_as(fitted, c) for c in fitted.without]
     found = []
@@ -171,12 +171,12 @@ def numbers(fitter: Fitter, believed: Stage, fitted: Fitted, *, effects: bool = 
 
     With `effects`, the sizes of forces that believed effects add as well, by amount.
     """
-    from scipy.stats import t as student
+    from scipy.special import stdtrit
 
     # Where a fast run is in one block only, the others still tell mass and damping, though less well.
     values, sets, sizes = fitter.numbers(_left_out(fitter, fitted, len(BASE)), effects=effects)
     spread = np.maximum(np.diag(scatter(sets)), 0.0)
-    factor = float(student.ppf(0.975, max(sets.shape[0] - 1, 1)))
+    factor = float(stdtrit(max(sets.shape[0] - 1, 1), 0.975))
     half = np.sqrt(factor**2 * spread + (MODEL * values) ** 2 + _of_the_balance(fitter, fitted, values) ** 2)
     m = believed.mechanics
     before = np.array([m.mass, m.viscous, m.micro_damping, *believed_friction(believed), *np.abs(sizes)])

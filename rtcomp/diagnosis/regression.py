@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from rtcomp.diagnosis.bounded import bounded_minimum
+from rtcomp.diagnosis.cores import shared
 from rtcomp.kernels import Floats
 
 RIDGE = 1e-9
@@ -52,12 +53,12 @@ class Grams:
     def of(cls, columns: Floats, y: Floats, block: np.ndarray, count: int) -> Grams:
         """Gather from columns (p, n), y (n,) and the sorted block number of every row (n,)."""
         edges = np.searchsorted(block, np.arange(count + 1))
-        gram, cross, power = [], [], []
-        for first, last in pairwise(edges):
-            part, target = columns[:, first:last], y[first:last]
-            gram.append(part @ part.T)
-            cross.append(part @ target)
-            power.append(target @ target)
+
+        def products(ends: tuple[int, int]) -> tuple[Floats, Floats, float]:
+            part, target = columns[:, slice(*ends)], y[slice(*ends)]
+            return part @ part.T, part @ target, float(target @ target)
+
+        gram, cross, power = zip(*shared(products, pairwise(edges.tolist())), strict=True)
         return cls(np.array(gram), np.array(cross), np.array(power), np.diff(edges).astype(np.float64))
 
     def solve(self, use: np.ndarray, prior: Prior, variance: float) -> Floats:

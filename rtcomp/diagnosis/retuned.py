@@ -88,11 +88,11 @@ def widening(clear: Floats, family: int) -> float:
 
     `clear` are the moves in half widths of plain 95 % intervals, of a `family` of numbers.
     """
-    from scipy.stats import t as student
+    from scipy.special import stdtrit
 
     order = np.sort(clear)[::-1]
     for told in range(family, 0, -1):
-        wider = float(student.ppf(1.0 - 0.025 * told / family, FREEDOM)) / WIDE
+        wider = float(stdtrit(FREEDOM, 1.0 - 0.025 * told / family)) / WIDE
         if order[told - 1] > wider:
             return wider
     return np.inf

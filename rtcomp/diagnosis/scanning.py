@@ -5,115 +5,109 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.excerpt import excerpt, with_few_units
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
 from rtcomp.errors import ConfigError
-from rtcomp.physics import Parameter
+from rtcomp.kernels import Floats
 
-SCANNED, AWAY = 14, 10.0
-"""Values of a number that are tried where first order is no guide; how many times its default they go to."""
-CLOSE, SLOWER = 1.4, 1.8
-"""Ratios of lengths and of frequencies in a wide scan: a play shows within a fifth of its gap, and where its
-load meets the ends about as fast as it does."""
-FREQUENCIES = 4
-"""Frequencies of a wide scan, down from the default; of another number half as many."""
-UNITS = 8
-"""Friction units that do for it."""
-NEAR, ROUNDS = 7, 2
-"""Values around the best, of one number after the other, and how often that is done."""
+CLOSE, FASTER = 1.4, 1.8
+"""Ratios of lengths and of frequencies that are looked through: a play shows within a fifth of its gap."""
+STIFFER = range(-1, 5)
+"""Powers of it by which a load swings faster against the ends of its play than the axis on its friction."""
+BEST, TRIES, FIRST = 2, 50, 0.3
+"""Points from which the least is looked for, how often each, and its first steps (logarithm)."""
+NEAR = 5
+"""Lengths around that at which the term as stated is looked at."""
 
 
-def scanned(fitter: Fitter, model: Fitted, term: Term, least: float, ends: float) -> list[Term]:
-    """Return the term at the length at which a model with it fits best; none where it fits best without.
+def scanned(fitter: Fitter, model: Fitted, term: Term, ends: float) -> list[Term]:
+    """Return the term with all its numbers where a model with it fits best, and with its length alone.
 
-    Where this gains as much as the `least` of what is fitted in full, also with those numbers free that else
-    have their defaults: how a load meets the ends of its play decides which length fits. They are looked
-    through one after the other, frequencies first, of which many fit almost, then the length again.
+    How a load meets the ends of its play decides which length fits: lengths and frequencies are looked
+    through together, on a part of the balance. From the best the least is looked for by simplex (Nelder and
+    Mead 1965, Computer Journal 7(4)): what leaves when the load is met a little earlier has no useful slope.
+    None where the model fits best without.
     """
-    length, stated = _length(term), _stated(term)
-    lengths = np.geomspace(*_lengths(fitter), SCANNED)
-    best = _best_of(fitter, model, term, ends)
-    left, alone = best(term.entry, length, lengths.tolist())
-    if left >= model.sse:
+    some = excerpt(fitter, model)
+    length = next(p.name for p in ent.free_parameters(term.entry, linear=False) if p.unit == "m")
+    stated = [p for p in ent.kind_of(term.entry).parameters if p.default is not None]
+    names = [*(p.name for p in stated), length]
+    defaults = {**{p.name: p.default for p in stated}, **term.entry}
+    left, from_afar = (_left(one, model, term, ends) for one in (some, with_few_units(some, model)))
+    without = some.quick(model.terms)
+    swings = math.sqrt(max(float(model.weights.sum()), 0.0) / fitter.balance.stage.mass) / (2.0 * math.pi)
+    grids = [[swings * FASTER**k for k in STIFFER] if p.unit == "Hz" else [p.default] for p in stated]
+    points = list(itertools.product(*grids, _lengths(fitter)))
+    tried = shared(lambda point: from_afar({**defaults, **dict(zip(names, point, strict=True))}), points)
+    begun = [points[i] for i in np.argsort(tried, kind="stable")[:BEST]]
+
+    def least(point: tuple[float, ...]) -> tuple[float, Entry]:
+        return _least(lambda at: left({**defaults, **dict(zip(names, at, strict=True))}, 2), names, point)
+
+    found, entry = min(shared(least, begun), key=lambda one: one[0])
+    if not found < without:
         return []
-    if math.log(model.sse / left) < least:
-        return [term.with_entry(alone)]
-    entry = {**{p.name: p.default for p in stated}, **alone}
-    for p in sorted(stated, key=lambda p: p.unit != "Hz"):
-        values = float(entry[p.name]) * np.geomspace(1.0 / AWAY, AWAY, SCANNED)
-        values = values[(values > p.lowest) & (values < ent.highest(entry, p))]
-        _, entry = best(entry, p.name, values.tolist())
-    shorter = float(entry[length]) * np.geomspace(1.0 / AWAY, 1.0, SCANNED)
-    _, entry = best(entry, length, shorter.tolist())
-    return [term.with_entry(alone), Term.of(entry)]
+    near = float(entry[length]) * np.geomspace(1.0 / FASTER, FASTER, NEAR)
+    as_stated = [{**term.entry, length: float(each)} for each in near]
+    alone = min(
+        zip(shared(lambda e: left({**defaults, **e}), as_stated), as_stated, strict=True),
+        key=lambda one: one[0],
+    )
+    return [Term.of({**defaults, **entry}), *([term.with_entry(alone[1])] if alone[0] < without else [])]
 
 
-def scanned_widely(fitter: Fitter, model: Fitted, term: Term, ends: float) -> list[Term]:
-    """Return the term at the numbers with which a model with it fits best, all looked through together.
+def _least(
+    left: Callable[[Floats], float], names: list[str], point: tuple[float, ...]
+) -> tuple[float, Entry]:
+    """Return what is left at the point where that is least near a first one, and its numbers."""
+    from scipy.optimize import minimize
 
-    With a few friction units, which do to see a play: far cheaper. None where it fits best without.
-    """
-    few = fitter.on(fitter.balance.data)
-    coarse = few.balance.coarse
-    step = float(np.log(coarse[-1] / coarse[0])) / (UNITS - 1)
-    few.balance.put(np.geomspace(coarse[0], coarse[-1], UNITS), step)
-    length, stated = _length(term), _stated(term)
-    shortest, longest = _lengths(fitter)
-    count = 2 + int(math.log(max(longest / shortest, 1.0)) / math.log(CLOSE))
-    entry = {**{p.name: p.default for p in stated}, **term.entry}
-    found = [(few.quick(model.terms), entry)]
-    best = _best_of(few, model, term, ends)
-    powers = [range(FREQUENCIES if p.unit == "Hz" else FREQUENCIES // 2) for p in stated]
-    for power in itertools.product(*powers):
-        less = {p.name: float(entry[p.name]) / SLOWER**k for p, k in zip(stated, power, strict=True)}
-        found.append(best({**entry, **less}, length, np.geomspace(shortest, longest, count).tolist()))
-    _, entry = min(found, key=lambda one: one[0])
-    if entry is found[0][1]:
-        return []
-    for _ in range(ROUNDS):
-        for name, most in [(p.name, ent.highest(entry, p)) for p in stated] + [(length, longest)]:
-            values = float(entry[name]) * np.geomspace(1.0 / SLOWER, SLOWER, NEAR)
-            _, entry = best(entry, name, values[values < most].tolist())
-    return [Term.of(entry)]
+    def left_at(logs: Floats) -> float:
+        return left(np.exp(logs))
+
+    at = np.log(np.array(point))
+    simplex = np.vstack([at, at + FIRST * np.eye(at.size)])
+    done = minimize(left_at, at, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": TRIES})
+    return float(done.fun), dict(zip(names, np.exp(done.x).tolist(), strict=True))
 
 
-def _lengths(fitter: Fitter) -> tuple[float, float]:
-    """Return the shortest and the longest length (m) of a play: two grains, a quarter of the stroke."""
+def _lengths(fitter: Fitter) -> list[float]:
+    """Return lengths (m) of a play, from two grains to a quarter of the stroke."""
     low, high = fitter.balance.data.stroke
-    return 2.0 * fitter.balance.grain, 0.25 * (high - low)
+    shortest, longest = 2.0 * fitter.balance.grain, 0.25 * (high - low)
+    count = 2 + int(math.log(max(longest / shortest, 1.0)) / math.log(CLOSE))
+    return [float(each) for each in np.geomspace(shortest, longest, count)]
 
 
-def _length(term: Term) -> str:
-    return next(p.name for p in ent.free_parameters(term.entry, linear=False) if p.unit == "m")
+def _left(fitter: Fitter, model: Fitted, term: Term, ends: float) -> Callable[..., float]:
+    """Return what tells what a model with an entry leaves, friction fitted so many times in turn."""
+    weights = fitter.balance.weights  # believed: a fit without the play takes it for longer reaches
+    if not weights.any():
+        weights = fitter.fit(model.terms, steps=0).weights
 
+    frequencies = [p for p in ent.kind_of(term.entry).parameters if p.unit == "Hz" and p.default is not None]
 
-def _stated(term: Term) -> list[Parameter]:
-    return [p for p in ent.kind_of(term.entry).parameters if p.default is not None]
-
-
-def _best_of(
-    fitter: Fitter, model: Fitted, term: Term, ends: float
-) -> Callable[[Entry, str, Sequence[float]], tuple[float, Entry]]:
-    """Return what tells which of an entry and others with other values of a number leaves least."""
-
-    def error(entry: Entry) -> float:
+    def left(entry: Entry, turns: int = 1) -> float:
         if time.monotonic() > ends:
-            return np.inf
+            return math.inf
+        at_hand, sse = weights, math.inf
+        if any(entry[p.name] > fitter.balance.data.rate for p in frequencies):
+            return math.inf  # as good as rigid, and many steps
         try:
-            return fitter.quick([*model.terms, term.with_entry(entry)])
+            for _ in range(turns):
+                _, _, _, c, sse = fitter.solve([*model.terms, term.with_entry(entry)], at_hand, 1.0)
+                at_hand = c[fitter.balance.friction]
         except (ConfigError, np.linalg.LinAlgError):
-            return np.inf
+            return math.inf
+        return sse
 
-    def best(entry: Entry, name: str, values: Sequence[float]) -> tuple[float, Entry]:
-        tried = [entry, *({**entry, name: value} for value in values)]
-        return min(zip(shared(error, tried), tried, strict=True), key=lambda one: one[0])
-
-    return best
+    return left

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.fft
 
+from rtcomp.diagnosis.cores import shared
 from rtcomp.kernels import Floats, compiled
 
 PAD = 0.1
@@ -51,15 +52,18 @@ def filtered(
     gain = _gain(response, few * every, rate, derivative, pad + first)
     at_rest = float(_gain(response, few * every, rate, False, 0)[0].real)
     out = np.empty((table.shape[0], at.size))
-    for some in range(0, table.shape[0], AT_A_TIME):
-        part = table[some : some + AT_A_TIME]
+
+    def fill(row: int) -> None:
+        part = table[row : row + AT_A_TIME]
         long, lines = np.zeros((part.shape[0], few * every)), np.empty((part.shape[0], 2))
         _lay_out(part, pad, noisy, long, lines)
         transformed = scipy.fft.rfft(long, axis=1, overwrite_x=True)
         folded = np.zeros((part.shape[0], few // 2 + 1), np.complex128)
         _fold(transformed, gain, every, folded)
         found = scipy.fft.irfft(folded, n=few, axis=1, overwrite_x=True)
-        _put_back(found, lines, at_rest, rate, derivative, at, out[some : some + AT_A_TIME])
+        _put_back(found, lines, at_rest, rate, derivative, at, out[row : row + AT_A_TIME])
+
+    shared(fill, range(0, table.shape[0], AT_A_TIME))
     return out if rows.ndim > 1 else out[0]
 
 

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from recorded import RATE, STAGE, changed, cut, run, stage, there_and_back
 
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.balance import ForceBalance, reserved_blocks
+from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import baseline
+from rtcomp.diagnosis.blocks import reserved_blocks
 from rtcomp.diagnosis.candidates import candidates, started
 from rtcomp.diagnosis.data import MOST_ROWS, load_data
 from rtcomp.diagnosis.fit import Fitter
