@@ -133,12 +133,15 @@ def candidates(
     more = [(kind, point) for kind, found in own.items() for point in found if kind.name in names]
     shown += [c for c in shared(make, more) if c is not None]
     # A form differs in shape, not in where it is: the others are looked at where the first does most.
+    forms = {kind: [p for p in found[1:] if not _first_form(kind, p)] for kind, found in points.items()}
+    if not any(forms.values()):
+        return shown
     likely = _likely(fitted, shown, fitter.rows)
     others = [
         (kind, point)
-        for kind, found in points.items()
-        for point in found[1:]
-        if not _first_form(kind, point) and any(_alike(kind, point[0], e) for e in likely.get(kind.name, []))
+        for kind, found in forms.items()
+        for point in found
+        if any(_alike(kind, point[0], e) for e in likely.get(kind.name, []))
     ]
     return [*shown, *(c for c in shared(make, others) if c is not None)]
 

@@ -16,6 +16,7 @@ from rtcomp.diagnosis.excerpt import excerpt, with_few_units
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.settings import LEAST_GAIN
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
@@ -42,12 +43,15 @@ def scanned(fitter: Fitter, model: Fitted, term: Term, ends: float) -> list[Term
     stated = [p for p in ent.kind_of(term.entry).parameters if p.default is not None]
     names = [*(p.name for p in stated), length]
     defaults = {**{p.name: p.default for p in stated}, **term.entry}
-    left, from_afar = (_left(one, model, term, ends) for one in (some, with_few_units(some, model)))
+    few = with_few_units(some, model)
+    left, from_afar = (_left(one, model, term, ends) for one in (some, few))
     without = some.quick(model.terms)
     swings = math.sqrt(max(float(model.weights.sum()), 0.0) / fitter.balance.stage.mass) / (2.0 * math.pi)
     grids = [[swings * FASTER**k for k in STIFFER] if p.unit == "Hz" else [p.default] for p in stated]
     points = list(itertools.product(*grids, _lengths(fitter)))
     tried = shared(lambda point: from_afar({**defaults, **dict(zip(names, point, strict=True))}), points)
+    if not min(tried) < (1.0 - LEAST_GAIN) ** 2 * few.quick(model.terms):
+        return []  # nor near any of them, or too little to matter
     begun = [points[i] for i in np.argsort(tried, kind="stable")[:BEST]]
 
     def least(point: tuple[float, ...]) -> tuple[float, Entry]:
