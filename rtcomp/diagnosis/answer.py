@@ -22,6 +22,7 @@ from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named
 from rtcomp.diagnosis.retuned import Numbers, all_by_one_factor, force_constant, retunings
 from rtcomp.diagnosis.selection import Search
 from rtcomp.diagnosis.settings import LEAST_GAIN, LEVEL, TOLERANCE
+from rtcomp.diagnosis.significance import log_gain
 from rtcomp.diagnosis.stage_of import with_forces
 from rtcomp.diagnosis.validation import Reserved
 from rtcomp.diagnosis.where import Compared, curves
@@ -82,7 +83,7 @@ def answer(
         named.append(Named(UNEXPLAINED, 1.0, {}, part, curve=left_over(left)))
     tuned = numbers(fitter, believed, final)
     stages, moved = _stages(believed, fitter, base, final, tuned, bool(named))
-    verdict, matters = _verdict(named, fitter, believed, base, moved)
+    verdict, matters = _verdict(named, fitter, believed, stages["retuned"], moved)
     if not matters:
         stages["after"] = stages["retuned"] = believed
     errors = reserved.judge({"before": believed, **stages})
@@ -189,13 +190,16 @@ def _found(balance: ForceBalance, believed: Stage, tuned: Numbers) -> list[Retun
 
 
 def _verdict(
-    named: Sequence[Named], fitter: Fitter, believed: Stage, base: Fitted, moved: Sequence[Retuned]
+    named: Sequence[Named], fitter: Fitter, believed: Stage, retuned: Stage, moved: Sequence[Retuned]
 ) -> tuple[Verdict, bool]:
     """Return the verdict, and whether other numbers than the believed ones are given."""
     if any(e.names != UNEXPLAINED for e in named):
         return "missing-physics", True
-    relative = fitter.relative_of(believed)
-    better = fitter.relative(base) < (1.0 - LEAST_GAIN) * relative
+    before, after = (fitter.left_by(stage) ** 2 for stage in (believed, retuned))
+    relative = float(np.sqrt(np.mean(before[fitter.rows])))
+    # By block, as every gain: what better numbers gain in one of them they must not lose in the others.
+    sums = [np.bincount(fitter.block, each, fitter.blocks)[fitter.use] for each in (before, after)]
+    better = log_gain(*(np.maximum(each, 1e-300) for each in sums)) > -2.0 * math.log1p(-LEAST_GAIN)
     matters = bool(moved) and better and relative > TOLERANCE
     if named:
         # Numbers bent to an unknown cause may do worse on other motion; friction where none was, not.

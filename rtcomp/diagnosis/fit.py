@@ -134,16 +134,13 @@ class Fitter:
 
     def relative(self, model: Fitted) -> float:
         """Return what a model leaves over what there is to explain, rms of both, without the reserved."""
-        return self._over_drive(self.force(model))
+        left, given = self.force(model)[self.rows], self.balance.drive_force()[self.rows]
+        return math.sqrt(np.mean(left**2) / max(np.mean(given**2), 1e-300))
 
-    def relative_of(self, stage: Stage) -> float:
-        """Return what any stage leaves as it is, over the same."""
+    def left_by(self, stage: Stage) -> Floats:
+        """Return what any stage leaves as it is in each row, (n,), over what there is to explain (rms)."""
         drive, needed = self.balance.both_sides(stage)
-        return self._over_drive(drive - needed, drive)
-
-    def _over_drive(self, force: Floats, drive: Floats | None = None) -> float:
-        given = self.balance.drive_force() if drive is None else drive
-        return math.sqrt(np.mean(force[self.rows] ** 2) / max(np.mean(given[self.rows] ** 2), 1e-300))
+        return np.asarray(drive - needed) / math.sqrt(max(np.mean(drive[self.rows] ** 2), 1e-300))
 
     def has_offset(self, model: Fitted) -> bool:
         """Tell whether a model has a constant force beside its entries."""

@@ -123,14 +123,12 @@ class Trajectory(Fitter):
 
     def relative(self, model: Fitted) -> float:
         """See `Fitter`: error over the way that forces moved the axis."""
-        return self._relative(model.residual)
+        return float(np.sqrt(np.sum(model.residual[self.rows] ** 2) / max(self._power, 1e-300)))
 
-    def relative_of(self, stage: Stage) -> float:
+    def left_by(self, stage: Stage) -> Floats:
         """See `Fitter`."""
-        return self._relative(self._bent(self.windows.off(stage)))
-
-    def _relative(self, residual: Floats) -> float:
-        return float(np.sqrt(np.sum(residual[self.rows] ** 2) / max(self._power, 1e-300)))
+        count = max(int(np.count_nonzero(self.rows)), 1)
+        return np.asarray(self._bent(self.windows.off(stage)) / np.sqrt(max(self._power / count, 1e-300)))
 
     def louder(self, model: Fitted) -> float:
         """See `Fitter`: no louder, so short a window tells no spectrum."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recorded import run, stage, there_and_back
+from recorded import STAGE, run, stage, there_and_back
 
 from rtcomp.diagnosis.admit import admit
 from rtcomp.diagnosis.pipeline import diagnose
@@ -35,6 +35,16 @@ def test_a_diagnosis_of_a_thin_belief_comes_to_its_end(
     assert found.verdict in ("missing-physics", "unexplained")
     assert found.fit.retuned < 0.3 * found.fit.before
     assert all(r.before == 0.0 for r in found.retuned if r.parameter not in ("mass", "force_constant"))
+
+
+def test_numbers_bent_to_a_part_of_the_recordings_are_not_given() -> None:
+    """Where the axis rubs for a while: friction fitted to that is wrong elsewhere."""
+    free = {**NEEDED, "viscous": 8.0, "effects": [{"name": "parallel-spring", "stiffness": 4000.0}]}
+    axis = Stage.from_dict({**STAGE, "stage": free})
+    rubs = Stage.from_dict({**STAGE, "stage": {**free, "friction": STAGE["stage"]["friction"]}})
+    found = diagnose(axis, [run(axis, there_and_back(16.0)), run(rubs, there_and_back(5.0))], budget=300.0)
+    assert found.verdict == "unexplained"
+    assert found.fit.after < 1.02 * found.fit.before
 
 
 @pytest.mark.slow
