@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.confirmed import denied
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
@@ -25,13 +26,14 @@ NOT_SHOWN = "it does not show in {}"
 
 
 def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, everything: float) -> bool:
-    """Tell whether the last effect of a model passes the one test and matters.
+    """Tell whether the effect of a model that its parent has not passes the one test and matters.
 
     Beside other forms of the effects before it: what these would explain as well is no further effect.
     """
     if null is None or model.at_bound:
         return False
-    forms = fitter.other_forms(parent, str(model.terms[-1].entry["name"]))
+    before_it = ent.names(parent.entries)
+    forms = fitter.other_forms(parent, next((n for n in ent.names(model.entries) if n not in before_it), ""))
     before, after = errors_beside(fitter, parent, forms), errors_beside(fitter, model, forms)
     p = null.p_value(log_gain(before, after))
     gained = math.sqrt(before.sum()) - math.sqrt(after.sum())
