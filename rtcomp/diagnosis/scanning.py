@@ -26,6 +26,8 @@ STIFFER = range(-1, 5)
 """Powers of it by which a load swings faster against the ends of its play than the axis on its friction."""
 BEST, TRIES, FIRST = 2, 50, 0.3
 """Points from which the least is looked for, how often each, and its first steps (logarithm)."""
+IMPOSSIBLE = 1e300
+"""What is left where numbers are out of their bounds, or the time is up."""
 NEAR = 5
 """Lengths around that at which the term as stated is looked at."""
 
@@ -76,7 +78,7 @@ def _least(
     from scipy.optimize import minimize
 
     def left_at(logs: Floats) -> float:
-        return left(np.exp(logs))
+        return min(left(np.exp(logs)), IMPOSSIBLE)  # of two infinities there is no difference
 
     at = np.log(np.array(point))
     simplex = np.vstack([at, at + FIRST * np.eye(at.size)])

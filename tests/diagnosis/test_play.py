@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 
 import numpy as np
 import pytest
@@ -120,6 +121,15 @@ def test_from_where_a_scan_ends_a_fit_comes_to_gap_contact_and_share() -> None:
         assert model.entries[0][name] == pytest.approx(play[name], rel=0.15)
     assert model.sse < 0.2 * base.sse
     assert scanned(fitter, base, begun, -math.inf) == []
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("seconds", [0.1, 0.5, 1.0])
+def test_a_scan_that_runs_out_of_time_says_nothing_on_the_terminal(seconds: float) -> None:
+    play = {"name": "backlash", "gap": 4e-6, "share": 0.35, "contact": 140.0}
+    balance = ForceBalance(stage(), load_data([run(stage(effects=[play]), there_and_back(12.0))]))
+    base, begun = baseline(balance), Term.of({"name": "backlash", "gap": 1e-6})
+    assert len(scanned(Fitter(balance), base, begun, time.monotonic() + seconds)) <= 2
 
 
 def test_a_scan_of_an_axis_without_play_finds_none_that_explains_it() -> None:
