@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import struct
 import time
 
@@ -24,6 +25,7 @@ from rtcomp.errors import (
     ProtocolError,
     RtcompError,
 )
+from rtcomp.loop.device import OK
 
 
 def test_a_drive_whose_largest_torque_is_nothing(driver, drive):
@@ -59,6 +61,31 @@ def test_a_node_that_is_not_there(made, drive):
     in_one_line(
         DeviceTimeoutError, ["drive 6", "does not answer at 1000000 bit/s", "nodes that do: 5"], driver.open
     )
+
+
+def slow(late, delay):
+    """Deliver the samples number `late` (a condition) after `delay` s."""
+    seen = itertools.count()
+
+    def to_host(frames):
+        if any(frame.identifier == 0x185 for frame in frames) and late(next(seen)):
+            time.sleep(delay)
+        return frames
+
+    return to_host
+
+
+def test_a_link_whose_every_sample_comes_too_late(made, drive):
+    drive.to_host = slow(lambda number: True, 0.015)
+    driver = made.driver(drive, reply_timeout=0.01, connect_timeout=0.5)
+    in_one_line(DeviceError, ["answers SYNC after 1", "waits 10 ms", "reply_timeout"], driver.open)
+
+
+def test_a_computer_that_is_busy_at_first_is_no_slow_link(made, drive):
+    drive.to_host = slow(lambda number: number < 20, 0.015)
+    driver = made.driver(drive, reply_timeout=0.01)
+    with driver:
+        assert driver.exchange(0.0).status == OK
 
 
 def test_a_bus_with_nobody_on_it(made, drive):
