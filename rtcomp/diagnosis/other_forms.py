@@ -19,7 +19,7 @@ from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitted import Fitted, left_out
 from rtcomp.diagnosis.regression import Grams, Prior
-from rtcomp.diagnosis.where import as_white
+from rtcomp.diagnosis.where import ROUNDING, as_white
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect
 
@@ -39,9 +39,12 @@ is biased."""
 
 
 def other_forms(balance: ForceBalance, entry: Entry, force: Floats) -> Floats:
-    """Return the whitened columns (q, n) of an entry's `force` (N, (n,)), bent by functions of size 1."""
+    """Return the whitened columns (q, n) of an entry's `force` (N, (n,)), bent by functions of size 1.
+
+    None of a constant: bent, it is no constant.
+    """
     most = float(np.abs(force).max(initial=0.0))
-    if not np.isfinite(most) or most == 0.0:
+    if not np.isfinite(most) or _size(force) == 0.0:
         return np.zeros((0, force.size))
     others = of_position(balance, entry)
     if others.size:
@@ -52,18 +55,25 @@ def other_forms(balance: ForceBalance, entry: Entry, force: Floats) -> Floats:
 def of_position(balance: ForceBalance, entry: Entry) -> Floats:
     """Return the whitened columns (q, n) of any other function of position, where an entry's force is one.
 
-    As large as the force, and without a constant; none where the force is no smooth function of position.
+    As large as what varies of the force; none where that is no smooth function of position.
     """
+    none = np.zeros((0, balance.block.size))
     if not ent.adds_force(ent.kind_of(entry)):
-        return np.zeros((0, balance.block.size))
+        return none
     effect, pairs = ent.build(entry), zip(balance.data.segments, balance.paths(), strict=True)
     force = balance.plain([balance.force_of(effect, segment, path) for segment, path in pairs])
     position = balance.plain([p.x for p in balance.paths()])
-    size, splines = float(np.sqrt(np.mean(force**2))), _natural_splines(position)
+    size, splines = _size(force), _natural_splines(position)
     rest = force - (force @ splines.T) @ splines / position.size
-    if size == 0.0 or not float(np.sqrt(np.mean(rest**2))) < SMOOTH * size:
-        return np.zeros((0, force.size))
+    if not _size(rest) < SMOOTH * size:
+        return none
     return np.array([as_white(balance, size * each) for each in splines[1:]])
+
+
+def _size(force: Floats) -> float:
+    """Return the size (rms) of what varies of a force, 0 where that is rounding."""
+    varies = float(np.std(force))
+    return varies if varies > ROUNDING * float(np.abs(force).max(initial=0.0)) else 0.0
 
 
 def _natural_splines(position: Floats) -> Floats:

@@ -227,6 +227,23 @@ def test_another_function_of_position_is_told_from_a_spring_where_it_repeats(
     assert not fitter.other_forms(fitted, "parallel-spring").size
 
 
+@pytest.mark.parametrize(
+    "entry", [{"name": "constant-force", "force": 3.0}, {"name": "drive-offset", "offset": 0.3}]
+)
+def test_a_constant_has_no_other_form(entry: dict[str, Any]) -> None:
+    """Neither a found nor a believed one: bent along position it would be any spring."""
+    plain, pushed = stage(), stage(effects=[entry])
+    run_with = run(pushed, there_and_back(20.0))
+    balance = ForceBalance(plain, load_data([run_with]))
+    baseline(balance)
+    fitter = Fitter(balance)
+    found = fitter.fit([Term.of(entry)])
+    assert found.terms[0].entry["name"] == entry["name"]
+    assert not fitter.other_forms(found, "parallel-spring").size
+    believed = ForceBalance(pushed, load_data([run_with]))
+    assert not Fitter(believed).other_forms(baseline(believed), "parallel-spring").size
+
+
 def test_other_forms_beside_a_model_do_not_make_it_a_poorer_one() -> None:
     """What is fitted to noise predicts blocks left out worse: no further effect is better for that."""
     believed = stage()
