@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,8 +101,11 @@ def candidates(
     events: bool = False,
     ends: float = math.inf,
     known: Sequence[Candidate] = (),
+    gains: Callable[[Sequence[Candidate]], Sequence[float]] | None = None,
 ) -> list[Candidate]:
     """Return every candidate beside a fitted model, with the columns it would add to it.
+
+    In further forms where `gains` tells what candidates explain.
 
     With `events`, those only that happen once, at a moment that the residual shows. Those not made until the
     time `ends` (time.monotonic) are left out; every effect's first start comes before the others. What is
@@ -134,9 +137,9 @@ def candidates(
     shown += [c for c in shared(make, more) if c is not None]
     # A form differs in shape, not in where it is: the others are looked at where the first does most.
     forms = {kind: [p for p in found[1:] if not _first_form(kind, p)] for kind, found in points.items()}
-    if not any(forms.values()):
+    if gains is None or not any(forms.values()):
         return shown
-    likely = _likely(fitted, shown, fitter.rows)
+    likely = _likely(shown, gains(shown))
     others = [
         (kind, point)
         for kind, found in forms.items()
@@ -154,19 +157,12 @@ def _first_form(kind: type[Effect], point: tuple[Entry, str]) -> bool:
     return point[0].get("form", "") in ("", *list(kind.forms)[:1])
 
 
-def _likely(fitted: Fitted, shown: Sequence[Candidate], rows: np.ndarray) -> dict[str, list[Entry]]:
-    """Return the start values of each effect that explain most beside a model, on some rows."""
-    span, _ = np.linalg.qr(np.concatenate([fitted.system.columns, fitted.tangents])[:, rows].T)
-    rest = fitted.residual[rows]
-    found: dict[str, list[tuple[float, Entry]]] = {}
-    for c in shown:
-        columns = c.columns[:, rows].T
-        beside, _ = np.linalg.qr(columns - span @ (span.T @ columns))
-        found.setdefault(c.name, []).append((float(np.sum((beside.T @ rest) ** 2)), c.term.entry))
-    return {
-        name: [entry for _, entry in sorted(all_of_it, key=lambda one: -one[0])[:LIKELY]]
-        for name, all_of_it in found.items()
-    }
+def _likely(shown: Sequence[Candidate], gains: Sequence[float]) -> dict[str, list[Entry]]:
+    """Return the start values of each effect that explain most."""
+    found: dict[str, list[Entry]] = {}
+    for i in np.argsort(-np.asarray(gains), kind="stable").tolist():
+        found.setdefault(shown[i].name, []).append(shown[i].term.entry)
+    return {name: entries[:LIKELY] for name, entries in found.items()}
 
 
 def _alike(kind: type[Effect], entry: Entry, other: Entry) -> bool:

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.candidates import candidates, started
+from rtcomp.diagnosis.candidates import started
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.growing import fitted_in_time
 from rtcomp.diagnosis.other_forms import in_any_form
-from rtcomp.diagnosis.replicates import best, free_columns
-from rtcomp.diagnosis.screening import Screen
+from rtcomp.diagnosis.replicates import best
+from rtcomp.diagnosis.screening import look
 from rtcomp.diagnosis.selection import Search
 from rtcomp.diagnosis.settings import ALIAS
 from rtcomp.diagnosis.significance import confidence_set, log_gain, probabilities
@@ -132,8 +132,8 @@ def _others(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -
     if known or time.monotonic() > ends:
         return known
     beside = (found.beside or ()) if fitter.by_force else ()
-    made = candidates(fitter, rest, [*ent.names(rest.entries), str(name)], known=beside)
-    screened = Screen(made, fitter.block, fitter.blocks, fitter.use).gains(free_columns(rest), rest.residual)
+    seen = look(fitter, rest, known=beside, without=[str(name)])
+    made, screened = seen.candidates, seen.screened
     least = NEAR * log_gain(rest.errors, chosen.errors)
     tried = [
         k for k in best([c.family for c in made], [s.gain for s in screened], 3) if screened[k].gain > least

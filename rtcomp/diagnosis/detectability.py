@@ -9,12 +9,12 @@ import numpy as np
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.candidates import Candidate, candidates
+from rtcomp.diagnosis.candidates import Candidate
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.regression import RIDGE
-from rtcomp.diagnosis.replicates import free_columns
 from rtcomp.diagnosis.result import Sight
+from rtcomp.diagnosis.screening import look
 from rtcomp.diagnosis.settings import LEVEL
 from rtcomp.diagnosis.significance import Null
 
@@ -29,9 +29,9 @@ def sights(
     `beside` are all candidates beside the model, where they are known.
     """
     balance = fitter.balance
-    made = beside or candidates(fitter, fitted, ent.names(fitted.entries))
+    made = beside or look(fitter, fitted).candidates
     use = fitter.rows
-    model = free_columns(fitted)[:, use]
+    model = fitted.free_columns[:, use]
     norm = np.sqrt(np.einsum("ij,ij->i", model, model))
     model = model / np.where(norm > 0.0, norm, 1.0)[:, None]
     gram = model @ model.T + RIDGE * np.eye(model.shape[0])

@@ -52,6 +52,14 @@ class Fitted:
         return any(f.at_bound(self.terms) for f in self.free if f.term == last)
 
     @property
+    def free_columns(self) -> Floats:
+        """Columns (p, n) that are not at a bound, with the tangents."""
+        slack = 1e-9 * np.abs(self.coefficients)
+        free = self.coefficients > self.prior.low + slack
+        free &= self.coefficients < self.prior.high - slack
+        return np.concatenate([self.system.columns[free], self.tangents])
+
+    @property
     def entries(self) -> list[Entry]:
         """Return the entries with the values found."""
         return [t.entry for t in self.terms]

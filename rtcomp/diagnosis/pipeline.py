@@ -22,7 +22,8 @@ from rtcomp.diagnosis.growing import in_better_form
 from rtcomp.diagnosis.locate import locate
 from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.result import Diagnosis, Place
-from rtcomp.diagnosis.selection import LOOKED, Look, Search, look, search, until
+from rtcomp.diagnosis.screening import Look, look
+from rtcomp.diagnosis.selection import LOOKED, Search, search, until
 from rtcomp.diagnosis.settings import BUDGET, LEAST_GAIN
 from rtcomp.diagnosis.sticking import hides, part_untold, sticks
 from rtcomp.diagnosis.trajectory import Trajectory

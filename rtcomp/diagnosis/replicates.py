@@ -39,14 +39,6 @@ class Drawn:
     in_full: float | None = None
 
 
-def free_columns(fitted: Fitted) -> Floats:
-    """Return the columns (p, n) of a fit that are not at a bound, with its tangents."""
-    c, prior = fitted.coefficients, fitted.prior
-    slack = 1e-9 * np.abs(c)
-    free = (c > prior.low + slack) & (c < prior.high - slack)
-    return np.concatenate([fitted.system.columns[free], fitted.tangents])
-
-
 def null_of(
     fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: int, ends: float = math.inf
 ) -> Null:
@@ -73,12 +65,11 @@ def null_of(
             return None
         other = fitter.on(data)
         again = other.fit(list(fitted.terms), fitted, steps=0)
-        gains = list(zip(screen.candidates, screen.gains(free_columns(again), again.residual), strict=True))
+        gains = list(zip(screen.candidates, screen.beside(again), strict=True))
         # Its own size is all that a single event has: the largest of these residuals, not of the recorded.
         made = candidates(other, again, names, events=True) if events else []
         if made:
-            look = Screen(made, other.block, other.blocks, other.use)
-            gains += zip(made, look.gains(free_columns(again), again.residual), strict=True)
+            gains += zip(made, Screen(made, other).beside(again), strict=True)
         errors = again.errors * fitter.power / max(other.power, 1e-300)
         candidate, screened = max(gains, key=lambda each: each[1].gain, default=(None, None))
         if candidate is None or screened is None or screened.gain <= 0.0:
@@ -157,7 +148,7 @@ def _by_chance(fitted: Fitted, screen: Screen, seed: int, count: int) -> Floats:
     (Theiler and others 1992, Physica D 58). It has no mean: a constant is nothing that chance makes.
     """
     random = np.random.default_rng(seed)
-    columns = free_columns(fitted)
+    columns = fitted.free_columns
     size = np.abs(np.fft.rfft(fitted.residual))
     size[0] = 0.0
     phases = random.random((count, size.size))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.fft
@@ -32,6 +33,9 @@ PEAKS = 3
 class Scales:
     """What a recording offers to each unit."""
 
+    balance: ForceBalance
+    residual: tuple[Floats, Floats]
+    """Of the fit beside which to look, (n,) each: as a force (N), and whitened, without the reserved."""
     length: tuple[float, float]
     stroke: tuple[float, float]
     speed: Floats
@@ -39,9 +43,21 @@ class Scales:
     time: tuple[float, float]
     frequency: tuple[float, float]
     force: float
-    periods: Floats
-    tones: Floats
-    moments: Floats
+
+    @cached_property
+    def periods(self) -> Floats:
+        """Periods (m) of waves along the position in the residual."""
+        return _periods(self.balance, *self.residual)
+
+    @cached_property
+    def tones(self) -> Floats:
+        """Frequencies (Hz) of the strongest lines of the residual in time."""
+        return tones_of(self.balance, self.residual[1])
+
+    @cached_property
+    def moments(self) -> Floats:
+        """Times (s) at which something may have happened."""
+        return _moments(self.balance, self.residual[1])
 
     @classmethod
     def of(cls, fitter: Fitter, fitted: Fitted) -> Scales:
@@ -57,8 +73,9 @@ class Scales:
         slow, fast = (max(float(np.quantile(moving, q)), 1e-12) for q in (0.02, 0.9))
         speed = np.geomspace(slow, fast, POINTS)
         force = fitter.force(fitted) * ~balance.reserved[balance.block]
-        rest = as_white(balance, force)
         return cls(
+            balance,
+            (force, as_white(balance, force)),
             (max(2.0 * balance.grain, 1e-5 * (high - low)), 0.5 * (high - low)),
             (low, high),
             speed,
@@ -66,9 +83,6 @@ class Scales:
             (data.period, data.seconds),
             (4.0 / data.seconds, min(0.4 * data.rate, balance.noise.bandwidth)),
             float(np.sqrt(np.mean(force**2))),
-            _periods(balance, force, rest),
-            tones_of(balance, rest),
-            _moments(balance, rest),
         )
 
     def of_parameter(self, p: Parameter, kind: type[Effect]) -> Sequence[float]:

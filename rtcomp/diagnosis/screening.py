@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from rtcomp.diagnosis.candidates import Candidate
-from rtcomp.diagnosis.fitted import ONCE
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.candidates import Candidate, candidates
+from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.fitted import ONCE, Fitted
 from rtcomp.diagnosis.regression import RIDGE
+from rtcomp.diagnosis.significance import Null
 from rtcomp.kernels import Floats
 
 
@@ -29,13 +34,13 @@ class Screen:
     A candidate has up to Q columns; those with fewer are filled up with a column of nothing.
     """
 
-    def __init__(self, found: Sequence[Candidate], block: np.ndarray, count: int, use: np.ndarray) -> None:
+    def __init__(self, found: Sequence[Candidate], fitter: Fitter) -> None:
         self.candidates = list(found)
         if not found:
             return
-        self._use = np.flatnonzero(use).tolist()
-        self._edges = list(pairwise(np.searchsorted(block, np.arange(count + 1)).tolist()))
-        self._columns = np.concatenate([*(c.columns for c in found), np.zeros((1, block.size))])
+        self._use = np.flatnonzero(fitter.use).tolist()
+        self._edges = list(pairwise(np.searchsorted(fitter.block, np.arange(fitter.blocks + 1)).tolist()))
+        self._columns = np.concatenate([*(c.columns for c in found), np.zeros((1, fitter.block.size))])
         norm = np.sqrt(np.einsum("ij,ij->i", self._columns, self._columns))
         scale = np.where(norm > 0.0, norm, 1.0)
         self._columns /= scale[:, None]
@@ -70,6 +75,10 @@ class Screen:
                 product[some] = np.einsum("ij,ij->i", part[self._index[some, i]], part[self._index[some, j]])
                 found[:, i, j] = found[:, j, i] = product
         return found
+
+    def beside(self, model: Fitted) -> list[Screened]:
+        """Return the gain of every candidate beside a fitted model."""
+        return self.gains(model.free_columns, model.residual)
 
     def gains(self, model: Floats, residual: Floats) -> list[Screened]:
         """Return the gain of every candidate beside the columns `model` (p, n) that left `residual` (n,).
@@ -138,3 +147,42 @@ class _Part:
         return _Part(
             self.aa - other.aa, self.ad - other.ad, self.ar - other.ar, self.dr - other.dr, self.rr - other.rr
         )
+
+
+@dataclass(frozen=True)
+class Look:
+    """All candidates beside a model, their gains, the null distribution where it was asked for."""
+
+    candidates: list[Candidate]
+    screened: list[Screened]
+    screen: Screen
+    null: Null | None = None
+    cut: bool = False
+    """Whether there was no time for all candidates."""
+
+    @property
+    def gain(self) -> float:
+        """The largest gain, 0 where no candidate was looked at."""
+        return max((s.gain for s in self.screened), default=0.0)
+
+
+def look(
+    fitter: Fitter,
+    model: Fitted,
+    ends: float = math.inf,
+    known: Sequence[Candidate] | None = None,
+    without: Sequence[str] = (),
+) -> Look:
+    """Look at all candidates beside a model, or those made in time, without their null distribution.
+
+    But for those of the effects `without`; what is `known` is not made again.
+    """
+
+    def gains(some: Sequence[Candidate]) -> list[float]:
+        return [each.gain for each in Screen(some, fitter).beside(model)]
+
+    taken = [*ent.names(model.entries), *without]
+    made = candidates(fitter, model, taken, ends=ends, known=known or (), gains=gains)
+    cut = time.monotonic() > ends
+    screen = Screen(made, fitter)
+    return Look(made, screen.beside(model), screen, None, cut)

@@ -10,14 +10,14 @@ from dataclasses import dataclass, field, replace
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.acceptance import accepted, doubts, exhausted, pruned, score
 from rtcomp.diagnosis.baseline import settle
-from rtcomp.diagnosis.candidates import Candidate, candidates
+from rtcomp.diagnosis.candidates import Candidate
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.growing import fitted_in_time, grow
-from rtcomp.diagnosis.replicates import best, free_columns, null_of
-from rtcomp.diagnosis.screening import Screen, Screened
+from rtcomp.diagnosis.replicates import best, null_of
+from rtcomp.diagnosis.screening import Look, Screen, Screened, look
 from rtcomp.diagnosis.settings import BEAM, LEAST_GAIN, LEVEL, MOST_EFFECTS
 from rtcomp.diagnosis.significance import Null
 from rtcomp.diagnosis.stage_of import bias_entry
@@ -161,8 +161,11 @@ def _beside(other: Fitted, seen: Look) -> tuple[list[Candidate], list[Screened]]
     What an effect changes is much the same beside either; where it begins to be fitted is all that is needed.
     """
     own = ent.names(other.entries)
-    gains = seen.screen.gains(free_columns(other), other.residual)
-    pairs = [pair for pair in zip(seen.candidates, gains, strict=True) if pair[0].name not in own]
+    pairs = [
+        pair
+        for pair in zip(seen.candidates, seen.screen.beside(other), strict=True)
+        if pair[0].name not in own
+    ]
     return [candidate for candidate, _ in pairs], [gain for _, gain in pairs]
 
 
@@ -251,37 +254,10 @@ def _refitted(fitter: Fitter, models: Sequence[Fitted]) -> list[Fitted]:
     return shared(lambda m: fitter.fit(m.terms, m), models)
 
 
-@dataclass(frozen=True)
-class Look:
-    """All candidates beside a model, their gains, the null distribution where it was asked for."""
-
-    candidates: list[Candidate]
-    screened: list[Screened]
-    screen: Screen
-    null: Null | None
-    cut: bool = False
-    """Whether there was no time for all candidates."""
-
-    @property
-    def gain(self) -> float:
-        """The largest gain, 0 where no candidate was looked at."""
-        return max((s.gain for s in self.screened), default=0.0)
-
-
 def until(ends: float, share: float) -> float:
     """Return the time at which a `share` of that which is left up to `ends` has passed (time.monotonic)."""
     now = time.monotonic()
     return now + share * max(ends - now, 0.0)
-
-
-def look(
-    fitter: Fitter, model: Fitted, ends: float = math.inf, known: Sequence[Candidate] | None = None
-) -> Look:
-    """Look at all candidates beside a model, or those made in time, without their null distribution."""
-    made = candidates(fitter, model, ent.names(model.entries), ends=ends, known=known or ())
-    cut = time.monotonic() > ends
-    screen = Screen(made, fitter.block, fitter.blocks, fitter.use)
-    return Look(made, screen.gains(free_columns(model), model.residual), screen, None, cut)
 
 
 def _judged(
@@ -304,7 +280,7 @@ def _judged(
     what = f"beside {' and '.join(names)}" if names else "search"
     say(0.0, what)
     if late:
-        first = Look([], [], Screen([], fitter.block, fitter.blocks, fitter.use), None)
+        first = Look([], [], Screen([], fitter), None)
     seen = first or look(fitter, model, ends, known)
     say(0.5, what)
     return replace(seen, null=null_of(fitter, model, seen.screen, seen.gain, seed, ends))

@@ -16,7 +16,7 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import baseline
 from rtcomp.diagnosis.blocks import reserved_blocks
-from rtcomp.diagnosis.candidates import candidates, started
+from rtcomp.diagnosis.candidates import started
 from rtcomp.diagnosis.data import MOST_ROWS, load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
@@ -24,6 +24,7 @@ from rtcomp.diagnosis.other_forms import errors_beside, overtones
 from rtcomp.diagnosis.regression import Grams
 from rtcomp.diagnosis.replicate import replicate
 from rtcomp.diagnosis.scales import tones_of
+from rtcomp.diagnosis.screening import look
 from rtcomp.diagnosis.stage_of import stage_of
 from rtcomp.diagnosis.validation import Reserved
 from rtcomp.diagnosis.where import as_force, as_white
@@ -295,7 +296,7 @@ def test_a_fit_stays_within_the_range_of_its_form() -> None:
     soft = {"name": "non-congruent-friction", "form": "elements", "softening": 3.0}
     balance = ForceBalance(stage(), load_data([run(stage(effects=[soft]), there_and_back())]))
     base, fitter = baseline(balance), Fitter(balance)
-    made = [c for c in candidates(fitter, base) if c.name == "non-congruent-friction"]
+    made = [c for c in look(fitter, base).candidates if c.name == "non-congruent-friction"]
     for candidate in made:
         term = started(candidate, np.array([1e3]))
         most = 1.0 if term.entry["form"] == "force" else 10.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from rtcomp.diagnosis.candidates import Candidate, candidates
 from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.replicates import free_columns, gain_in_full, null_of
+from rtcomp.diagnosis.replicates import gain_in_full, null_of
 from rtcomp.diagnosis.screening import Screen
 from rtcomp.diagnosis.significance import Null, confidence_set, log_gain, probabilities
 
@@ -37,7 +38,7 @@ def test_gains_are_those_of_refits_without_each_block() -> None:
     use[4] = False
     seen = use[block]
     c = np.linalg.lstsq(model[:, seen].T, y[seen], rcond=None)[0]
-    found = Screen(free, block, blocks, use).gains(model, y - c @ model)
+    found = Screen(free, SimpleNamespace(block=block, blocks=blocks, use=use)).gains(model, y - c @ model)
     for columns, screened in zip(spans, found, strict=True):
         both = np.concatenate([model, columns])
         logs = []
@@ -68,8 +69,8 @@ def test_the_largest_gain_is_that_of_a_fit() -> None:
     balance = ForceBalance(stage(), load_data([run(hidden, there_and_back())]))
     base, fitter = baseline(balance), Fitter(balance)
     made = [c for c in candidates(fitter, base) if c.name == "drive-deadband"]
-    screen = Screen(made, fitter.block, fitter.blocks, fitter.use)
-    screened = screen.gains(free_columns(base), base.residual)
+    screen = Screen(made, fitter)
+    screened = screen.beside(base)
     best = max(range(len(made)), key=lambda i: screened[i].gain)
     fully = gain_in_full(fitter, base, made[best], screened[best])
     right = fitter.fit([Term.of({"name": "drive-deadband", "width": 0.3})], base)
@@ -84,7 +85,7 @@ def test_chance_makes_no_constant_force() -> None:
     balance = ForceBalance(stage(), load_data([run(stage(), there_and_back())]))
     fitter, base = Fitter(balance), baseline(balance)
     constant = [c for c in candidates(fitter, base) if c.name == "constant-force"]
-    screen = Screen(constant, fitter.block, fitter.blocks, fitter.use)
+    screen = Screen(constant, fitter)
     noise = np.random.default_rng(3).standard_normal(base.residual.size)
     constantly = replace(base, residual=noise + 3.0)
     null = null_of(fitter, constantly, screen, gain=2.0, seed=0)
