@@ -107,8 +107,8 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
     more = null is not None and null.p_of_error(chosen.errors) < LEVEL
     noise = null.noise if null is not None else 0.0
     beyond = max(1.0 - noise / max(float(chosen.errors.sum()), 1e-300), 0.0)
-    # A wave of any form is the same effect: what only makes its form another is not left.
-    others = [fitter.overtones(chosen, i) for i in range(len(chosen.terms))]
+    # A wave of any form is the same effect, or a drift of any course: what only makes it another is not left.
+    others = [fitter.variants(chosen, i) for i in range(len(chosen.terms))]
     rest = in_any_form(fitter, chosen, np.concatenate([np.zeros((0, chosen.residual.size)), *others]))
     for i, span in enumerate(told(fitter, chosen)):
         why = "its size may be nothing" if span.nothing else ""

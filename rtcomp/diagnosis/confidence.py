@@ -91,9 +91,9 @@ def _by_cell(fitter: Fitter, model: Fitted, at: int) -> Floats:
     """Return the squared error of a model in every cell that is not reserved, (C,).
 
     What acts now and then, as a drive's limit, shows in some of them: of ten blocks it would be by chance.
-    A wave in the place `at` is compared in any form.
+    That in the place `at` is compared in any form of its own.
     """
-    model = in_any_form(fitter, model, fitter.overtones(model, at))
+    model = in_any_form(fitter, model, fitter.variants(model, at))
     block = fitter.block
     cell = np.arange(block.size) * (fitter.blocks * CELLS) // block.size
     used = fitter.use[block]

@@ -52,6 +52,12 @@ def waves(kind: type[Effect], entry: Mapping[str, Any]) -> bool:
     return bool(phases) and bool(_sinusoidal(cast(Hashable, kind), str(entry.get("form", ""))))
 
 
+def goes_by_time(kind: type[Effect]) -> bool:
+    """Tell whether what an effect does goes by the time of the run, and neither once nor in a wave."""
+    once_or_wave = happens_once(kind) or any(p.unit == PHASE for p in kind.parameters)
+    return not once_or_wave and bool(_by_time(cast(Hashable, kind)))
+
+
 @cache
 def _adds_force(kind: Any) -> bool:
     if kind.place is Place.SENSOR or not kind.linear:
@@ -77,13 +83,23 @@ def _sinusoidal(kind: Any, form: str) -> bool:
     return bool(np.allclose(found[2], expected, rtol=1e-6, atol=1e-9 * float(np.abs(found[0]).max())))
 
 
-def _changes(effect: Effect, other: float = 0.0) -> Floats:
-    """Return what an effect changes on the wires along a motion like its example's, beside `other` forces."""
+@cache
+def _by_time(kind: Any) -> bool:
+    effects = [kind.from_dict(kind.example) for _ in range(2)]
+    made = [_changes(effect, later=later) for effect, later in zip(effects, (0.0, 1.0), strict=True)]
+    return not np.allclose(made[0], made[1], rtol=1e-6, atol=1e-12)
+
+
+def _changes(effect: Effect, other: float = 0.0, later: float = 0.0) -> Floats:
+    """Return what an effect changes on the wires along a motion like its example's, beside `other` forces.
+
+    The motion begins so many seconds `later` than the run.
+    """
     random = np.random.default_rng(0)
     count = 400
     given = random.uniform(0.5, 1.5, (count, wires.COUNT)) * 1e-3
     given[:, wires.STEP] = 0.01
-    given[:, wires.TIME] = 0.01 * np.arange(1, count + 1)
+    given[:, wires.TIME] = later + 0.01 * np.arange(1, count + 1)
     given[:, wires.VOLTS] = random.uniform(-10.0, 10.0, count)
     given[:, wires.POSITION] = random.uniform(-1e-3, 1e-3, count)
     given[:, wires.VELOCITY] = random.uniform(-0.05, 0.05, count)

@@ -26,7 +26,7 @@ from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitted import Fitted, left_out
 from rtcomp.diagnosis.free import Free, Term, free_of
 from rtcomp.diagnosis.noise import Noise
-from rtcomp.diagnosis.other_forms import other_beliefs, other_forms, overtones
+from rtcomp.diagnosis.other_forms import other_beliefs, other_forms, variants
 from rtcomp.diagnosis.regression import Grams, Prior
 from rtcomp.diagnosis.result import PositionFit
 from rtcomp.diagnosis.retuned import level_and_reach
@@ -118,19 +118,12 @@ class Fitter:
 
     def other_forms(self, model: Fitted, besides: str) -> Floats:
         """Return the columns (q, n) of what other forms of its effects do, but of that which is `besides`."""
+        own = self._forms.of(model, lambda: [other_forms(self, model)])
+        return np.concatenate([other_beliefs(self.balance, model, besides), *own])
 
-        def made() -> list[Floats]:
-            left, count = self.force(model), len(model.terms)
-            forces = [self.without(model, i) - left for i in range(count)]
-            found = [other_forms(self.balance, *one) for one in zip(model.entries, forces, strict=True)]
-            found += [self.overtones(model, i) for i in range(count)]
-            return [np.concatenate([np.zeros((0, left.size)), *found])]
-
-        return np.concatenate([other_beliefs(self.balance, model, besides), *self._forms.of(model, made)])
-
-    def overtones(self, model: Fitted, at: int) -> Floats:
-        """Return the columns (q, n) that another form of its effect number `at`, if a wave, would add."""
-        return overtones(self, model, model.entries[at])
+    def variants(self, model: Fitted, at: int) -> Floats:
+        """Return the columns (q, n) that another form of its effect number `at` would add by its own law."""
+        return variants(self, model, at)
 
     def relative(self, model: Fitted) -> float:
         """Return what a model leaves over what there is to explain, rms of both, without the reserved."""
@@ -240,8 +233,7 @@ class Fitter:
         damping, tangents = 1e-3, None
         for _ in range(steps if free else 0):
             tangents = self._tangents(current, free, system, c, weights)
-            wide = prior.extended(np.full(len(free), -np.inf), np.full(len(free), np.inf))
-            joint = Grams.of(np.concatenate([system.columns, tangents]), system.y, b.block, b.blocks)
+            joint, wide = self._jointly(system, prior, tangents)
             power = np.diag(joint.gram[self.use].sum(axis=0))[c.size :]
             improved = False
             for _ in range(4):
@@ -293,6 +285,12 @@ class Fitter:
         worse = max(sse / max(model.sse, 1e-300), 1.0)
         return replace(model, residual=true, sse=worse * model.sse, errors=worse * model.errors)
 
+    def _jointly(self, system: System, prior: Prior, tangents: Floats) -> tuple[Grams, Prior]:
+        """Return statistics and prior of all columns of a system and of tangents, (q, n), together."""
+        some = np.full(tangents.shape[0], np.inf)
+        columns = np.concatenate([system.columns, tangents])
+        return Grams.of(columns, system.y, self.block, self.blocks), prior.extended(-some, some)
+
     def _finished(
         self,
         terms: list[Term],
@@ -305,9 +303,7 @@ class Fitter:
         variance: float,
         weights: Floats,
     ) -> Fitted:
-        b = self.balance
-        wide = prior.extended(np.full(len(free), -np.inf), np.full(len(free), np.inf))
-        joint = Grams.of(np.concatenate([system.columns, tangents]), system.y, b.block, b.blocks)
+        joint, wide = self._jointly(system, prior, tangents)
         whole = np.concatenate([c, np.zeros(len(free))])
         errors, without = left_out(joint, self.use, wide, variance, whole)
         residual = system.y - c @ system.columns

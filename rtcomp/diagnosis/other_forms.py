@@ -38,7 +38,28 @@ LONGER = 0.02
 is biased."""
 
 
-def other_forms(balance: ForceBalance, entry: Entry, force: Floats) -> Floats:
+def other_forms(fitter: Fitter, model: Fitted) -> Floats:
+    """Return the columns (q, n) of what other forms of a model's effects do."""
+    found = [np.zeros((0, model.residual.size))]
+    for i, entry in enumerate(model.entries):
+        found += [_bent(fitter.balance, entry, _force_of(fitter, model, i)), overtones(fitter, model, entry)]
+    return np.concatenate(found)
+
+
+def variants(fitter: Fitter, model: Fitted, at: int) -> Floats:
+    """Return the columns (q, n) that another form of a model's effect number `at` would add by its own law.
+
+    Of a wave its overtones, of what goes by the time of the run another course.
+    """
+    return np.concatenate([overtones(fitter, model, model.entries[at]), _courses(fitter, model, at)])
+
+
+def _force_of(fitter: Fitter, model: Fitted, at: int) -> Floats:
+    """Return the force (N, (n,)) of a model's effect number `at`."""
+    return fitter.without(model, at) - fitter.force(model)
+
+
+def _bent(balance: ForceBalance, entry: Entry, force: Floats) -> Floats:
     """Return the whitened columns (q, n) of an entry's `force` (N, (n,)), bent by functions of size 1.
 
     None of a constant: bent, it is no constant.
@@ -100,6 +121,18 @@ def other_beliefs(balance: ForceBalance, model: Fitted, besides: str) -> Floats:
         if entry["name"] != besides and span.stop > span.start:
             found.append(of_position(balance, ent.composed(entry, model.coefficients[span])))
     return np.concatenate(found)
+
+
+def _courses(fitter: Fitter, model: Fitted, at: int) -> Floats:
+    """Return the columns (q, n) of another course in time of a model's effect number `at`.
+
+    None of what does not go by the time of the run.
+    """
+    balance = fitter.balance
+    if not ent.goes_by_time(ent.kind_of(model.entries[at])):
+        return np.zeros((0, model.residual.size))
+    force, time = _force_of(fitter, model, at), balance.plain([s.time for s in balance.data.segments])
+    return np.array([as_white(balance, force * bend) for bend in _bent_by(time)])
 
 
 def overtones(fitter: Fitter, model: Fitted, entry: Entry) -> Floats:
@@ -174,7 +207,12 @@ def _bends(balance: ForceBalance, force: Floats) -> Iterator[Floats]:
     position = balance.plain([p.x for p in paths])
     time = balance.plain([s.time for s in balance.data.segments])
     for signal in (position, balance.plain([p.v for p in paths]), time, force):
-        low, high = float(signal.min()), float(signal.max())
-        at = (2.0 * signal - low - high) / max(high - low, 1e-300)
-        yield at
-        yield 1.5 * at**2 - 0.5
+        yield from _bent_by(signal)
+
+
+def _bent_by(signal: Floats) -> Iterator[Floats]:
+    """Go through the first two Legendre polynomials of a signal (n,) over its range."""
+    low, high = float(signal.min()), float(signal.max())
+    at = (2.0 * signal - low - high) / max(high - low, 1e-300)
+    yield at
+    yield 1.5 * at**2 - 0.5

@@ -117,7 +117,7 @@ class Trajectory(Fitter):
         """Return no columns: what a force does to the position is not in proportion to it."""
         return np.zeros((0, model.residual.size))
 
-    def overtones(self, model: Fitted, at: int) -> Floats:
+    def variants(self, model: Fitted, at: int) -> Floats:
         """See `other_forms`."""
         return np.zeros((0, model.residual.size))
 

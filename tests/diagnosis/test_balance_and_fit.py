@@ -204,6 +204,24 @@ def test_another_form_of_a_wave_has_its_overtones_and_no_other_waves(name: str) 
     assert left(0.77e-4) > 0.8
 
 
+def test_another_form_of_a_drift_has_another_course_and_what_does_not_drift_none() -> None:
+    """Fast at first in place of as fast all the time; not so friction that falls with speed."""
+    drifts = {"name": "friction-drift", "form": "linear", "change": 0.4, "time_constant": 20.0}
+    falls = {"name": "stribeck", "rise": 0.3, "velocity": 2e-3}
+    for entry, none in ((drifts, False), (falls, True)):
+        recording = run(stage(effects=[entry]), there_and_back(20.0))
+        balance = ForceBalance(stage(), load_data([recording]))
+        base, fitter = baseline(balance), Fitter(balance)
+        model = fitter.fit([Term.of(entry)], base)
+        forms = fitter.variants(model, 0)
+        assert (forms.size == 0) == none
+        if not none:
+            other = fitter.change(base, {**entry, "form": "level", "time_constant": 6.0})
+            columns = np.concatenate([forms, model.tangents, fitter.change(base, entry)[None, :]])
+            rest = other - np.linalg.lstsq(columns.T, other, rcond=None)[0] @ columns
+            assert np.linalg.norm(rest) < 0.15 * np.linalg.norm(other)
+
+
 @pytest.mark.parametrize(("waves", "told"), [(0.5, False), (1.0, False), (3.0, True), (4.0, True)])
 def test_another_function_of_position_is_told_from_a_spring_where_it_repeats(
     waves: float, told: bool
