@@ -8,6 +8,7 @@ import numpy as np
 
 from rtcomp.control.reference_settings import reference_settings
 from rtcomp.control.references import build_reference, check
+from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.replicate import followed
 from rtcomp.diagnosis.result import Experiment
 from rtcomp.diagnosis.view import View
@@ -55,8 +56,8 @@ def next_experiment(one: Stage, other: Stage, names: tuple[str, str], motion: Vi
         return None
     noise = max(float(np.hypot(one.sensor.noise, one.sensor.resolution)), 1e-9)
     quiet = max(one.controller.kp * noise, 1e-6)
-    best: tuple[float, str, dict[str, Any]] | None = None
-    for says, section in manoeuvres(motion).items():
+
+    def apart(section: dict[str, Any]) -> float:
         try:
             reference = build_reference(reference_settings(section))
             strongest = one.voltage_limit * one.force_constant / one.mass
@@ -65,12 +66,14 @@ def next_experiment(one: Stage, other: Stage, names: tuple[str, str], motion: Vi
             path = reference.evaluate(t)[0]
             (position, voltage), with_other = (followed(stage, path, motion.rate) for stage in (one, other))
         except RtcompError:
-            continue
-        apart = float(np.sqrt(np.mean((position - with_other[0]) ** 2))) / noise
-        apart += float(np.sqrt(np.mean((voltage - with_other[1]) ** 2))) / quiet
-        if np.isfinite(apart) and (best is None or apart > best[0]):
-            best = (apart, says, section)
-    if best is None:
+            return -np.inf
+        far = float(np.sqrt(np.mean((position - with_other[0]) ** 2))) / noise
+        far += float(np.sqrt(np.mean((voltage - with_other[1]) ** 2))) / quiet
+        return far if np.isfinite(far) else -np.inf
+
+    possible = manoeuvres(motion)
+    distances = shared(apart, possible.values())
+    says, section = list(possible.items())[int(np.argmax(distances))]
+    if max(distances) == -np.inf:
         return None
-    seconds = float(best[2].get("duration", SECONDS))
-    return Experiment(best[2], names, seconds, best[1])
+    return Experiment(section, names, float(section.get("duration", SECONDS)), says)
