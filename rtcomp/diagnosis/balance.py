@@ -312,10 +312,14 @@ class ForceBalance(Signals):
     @property
     def force_bandwidth(self) -> float:
         """Hz, up to which the drive's force stands above what the sensor's noise makes of the residual."""
-        frequency, density = spectrum(self._drive_side([], []), self.data.rate)
-        noise = 1.0 / (self.whitening.white(frequency) ** 2 * 0.5 * self.data.rate)
+        frequency, density, noise = self.force_densities()
         below = np.flatnonzero(density < noise)
         return float(frequency[max(below[0] - 1, 0) if below.size else -1])
+
+    def force_densities(self) -> tuple[Floats, Floats, Floats]:
+        """Return frequencies (Hz), the density of the drive's force and of noise (N^2/Hz), (F,) each."""
+        frequency, density = spectrum(self._drive_side([], []), self.data.rate)
+        return frequency, density, 2.0 * self.whitening.coloured(frequency) ** 2 / self.data.rate
 
     def drive_force(self) -> Floats:
         """Return the force of the believed drive (N, (n,)) below the motion's bandwidth."""

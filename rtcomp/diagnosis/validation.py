@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from rtcomp.diagnosis.balance import LEAST_FORCE, ForceBalance
+from rtcomp.diagnosis.where import as_seen, noise_seen
 from rtcomp.errors import RecordingError
 from rtcomp.stage.stage import Stage
 
@@ -31,6 +32,8 @@ class Reserved:
     def judge(self, stages: Mapping[str, Stage]) -> dict[str, float]:
         """Return the relative force error (rms over rms) of each stage, and as ``noise`` the sensor's.
 
+        Of forces as far as they stand above that noise: what is beyond tells nothing of a stage.
+
         Raises RuntimeError when asked again: what is asked twice is selected on.
         """
         if self._judged:
@@ -42,7 +45,7 @@ class Reserved:
         power = 0.0
         for name, stage in stages.items():
             drive, needed = b.both_sides(stage)
-            power = power or float(np.mean(drive[rows] ** 2))
-            found[name] = float(np.sqrt(np.mean((drive - needed)[rows] ** 2) / max(power, 1e-300)))
-        found["noise"] = float(np.sqrt(b.noise_power / max(power, 1e-300)))
+            power = power or float(np.mean(as_seen(b, drive)[rows] ** 2))
+            found[name] = float(np.sqrt(np.mean(as_seen(b, drive - needed)[rows] ** 2) / max(power, 1e-300)))
+        found["noise"] = noise_seen(b) / max(power, 1e-300) ** 0.5
         return found

@@ -12,7 +12,7 @@ from rtcomp.diagnosis.curves import Curve, curve_of
 from rtcomp.diagnosis.data import Segment
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.locate import axes_of
-from rtcomp.diagnosis.spectrum import Response, filtered
+from rtcomp.diagnosis.spectrum import Response, filtered, interpolated
 from rtcomp.kernels import Floats
 
 ROUNDING = 1e-9
@@ -72,6 +72,25 @@ def as_force(balance: ForceBalance, residual: Floats) -> Floats:
 def as_white(balance: ForceBalance, force: Floats) -> Floats:
     """Return a force (N, (n,)) on the compared rows as a whitened residual: the inverse of `as_force`."""
     return _weighed(balance, force, balance.whitening.white)
+
+
+def as_seen(balance: ForceBalance, force: Floats) -> Floats:
+    """Return what of a force (N, (n,)) on the compared rows stands above the sensor's noise."""
+    frequency, share, _ = _seen(balance)
+    return _weighed(balance, force, interpolated(frequency, np.maximum(share, 1e-6)))
+
+
+def noise_seen(balance: ForceBalance) -> float:
+    """Return what the sensor's noise makes of the force that `as_seen` leaves (N rms)."""
+    frequency, share, noise = _seen(balance)
+    density = noise * (share * balance.noise.wiener(frequency)) ** 2
+    return float(np.sqrt(np.trapezoid(density, frequency)))
+
+
+def _seen(balance: ForceBalance) -> tuple[Floats, Floats, Floats]:
+    """Return frequencies (Hz), the part of the drive's force that is no noise, and that noise (N^2/Hz)."""
+    frequency, density, noise = balance.force_densities()
+    return frequency, np.maximum(1.0 - noise / np.maximum(density, 1e-300), 0.0), noise
 
 
 def _weighed(balance: ForceBalance, signal: Floats, response: Response) -> Floats:

@@ -27,7 +27,7 @@ from rtcomp.diagnosis.scales import tones_of
 from rtcomp.diagnosis.screening import look
 from rtcomp.diagnosis.stage_of import stage_of
 from rtcomp.diagnosis.validation import Reserved
-from rtcomp.diagnosis.where import as_force, as_white
+from rtcomp.diagnosis.where import as_force, as_seen, as_white, noise_seen
 from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.physics import Effect, catalogue
 from rtcomp.stage.balance import between_rows
@@ -101,6 +101,22 @@ def test_reserved_blocks_judge_once() -> None:
     assert errors["before"] < 3.0 * errors["noise"] + 0.01
     with pytest.raises(RuntimeError, match="judged already"):
         reserved.judge({"before": believed})
+
+
+def test_a_judgement_counts_forces_that_stand_above_the_sensors_noise() -> None:
+    """A tone in the band of the motion is kept; one beyond that of the drive's force is nearly gone."""
+    believed = Stage.from_dict({**STAGE, "sensor": {"noise": 5e-7, "resolution": 1e-8}})
+    balance = ForceBalance(believed, load_data([run(believed, there_and_back(20.0))]))
+    baseline(balance)
+    time = balance.plain([s.time for s in balance.data.segments])
+    most = 0.4 / float(np.median(np.diff(time)))
+    left = [
+        float(np.std(as_seen(balance, np.sin(2.0 * np.pi * hertz * time))) * np.sqrt(2.0))
+        for hertz in (1.0, min(2.0 * balance.force_bandwidth, most))
+    ]
+    assert left[0] > 0.97
+    assert left[1] < 0.1
+    assert noise_seen(balance) < 1.05 * balance.noise_power**0.5
 
 
 def test_a_judgement_needs_motion_in_the_reserved_blocks() -> None:
