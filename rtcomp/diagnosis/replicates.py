@@ -69,7 +69,7 @@ def null_of(
         # Its own size is all that a single event has: the largest of these residuals, not of the recorded.
         made = candidates(other, again, names, events=True) if events else []
         if made:
-            gains += zip(made, Screen(made, other).beside(again), strict=True)
+            gains += zip(made, Screen(made, other, screen.variants).beside(again), strict=True)
         errors = again.errors * fitter.power / max(other.power, 1e-300)
         candidate, screened = max(gains, key=lambda each: each[1].gain, default=(None, None))
         if candidate is None or screened is None or screened.gain <= 0.0:
@@ -148,7 +148,7 @@ def _by_chance(fitted: Fitted, screen: Screen, seed: int, count: int) -> Floats:
     (Theiler and others 1992, Physica D 58). It has no mean: a constant is nothing that chance makes.
     """
     random = np.random.default_rng(seed)
-    columns = fitted.free_columns
+    columns = screen.columns_beside(fitted)
     size = np.abs(np.fft.rfft(fitted.residual))
     size[0] = 0.0
     phases = random.random((count, size.size))

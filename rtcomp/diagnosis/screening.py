@@ -34,8 +34,10 @@ class Screen:
     A candidate has up to Q columns; those with fewer are filled up with a column of nothing.
     """
 
-    def __init__(self, found: Sequence[Candidate], fitter: Fitter) -> None:
+    def __init__(self, found: Sequence[Candidate], fitter: Fitter, variants: Floats | None = None) -> None:
         self.candidates = list(found)
+        self.variants = np.zeros((0, fitter.block.size)) if variants is None else variants
+        """Columns (q, n) that stand beside any model as well."""
         if not found:
             return
         self._use = np.flatnonzero(fitter.use).tolist()
@@ -78,7 +80,11 @@ class Screen:
 
     def beside(self, model: Fitted) -> list[Screened]:
         """Return the gain of every candidate beside a fitted model."""
-        return self.gains(model.free_columns, model.residual)
+        return self.gains(self.columns_beside(model), model.residual)
+
+    def columns_beside(self, model: Fitted) -> Floats:
+        """Return the columns (p, n) beside which candidates of a fitted model are looked at."""
+        return np.concatenate([model.free_columns, self.variants])
 
     def gains(self, model: Floats, residual: Floats) -> list[Screened]:
         """Return the gain of every candidate beside the columns `model` (p, n) that left `residual` (n,).
@@ -175,14 +181,17 @@ def look(
 ) -> Look:
     """Look at all candidates beside a model, or those made in time, without their null distribution.
 
-    But for those of the effects `without`; what is `known` is not made again.
+    But for those of the effects `without`; what is `known` is not made again. Of the model's own effects any
+    form of their law stands beside them: what only makes up for the form is no candidate.
     """
+    variants = [fitter.variants(model, i) for i in range(len(model.terms))]
+    beside = np.concatenate([np.zeros((0, fitter.block.size)), *variants])
 
     def gains(some: Sequence[Candidate]) -> list[float]:
-        return [each.gain for each in Screen(some, fitter).beside(model)]
+        return [each.gain for each in Screen(some, fitter, beside).beside(model)]
 
     taken = [*ent.names(model.entries), *without]
     made = candidates(fitter, model, taken, ends=ends, known=known or (), gains=gains)
     cut = time.monotonic() > ends
-    screen = Screen(made, fitter)
+    screen = Screen(made, fitter, beside)
     return Look(made, screen.beside(model), screen, None, cut)

@@ -24,7 +24,7 @@ from rtcomp.diagnosis.other_forms import errors_beside, overtones
 from rtcomp.diagnosis.regression import Grams
 from rtcomp.diagnosis.replicate import replicate
 from rtcomp.diagnosis.scales import tones_of
-from rtcomp.diagnosis.screening import look
+from rtcomp.diagnosis.screening import Screen, Screened, look
 from rtcomp.diagnosis.stage_of import stage_of
 from rtcomp.diagnosis.validation import Reserved
 from rtcomp.diagnosis.where import as_force, as_seen, as_white, noise_seen
@@ -218,6 +218,24 @@ def test_another_form_of_a_wave_has_its_overtones_and_no_other_waves(name: str) 
     assert left(1.002 * 0.5e-4) < 0.3
     assert left(2.0e-4) < 0.03
     assert left(0.77e-4) > 0.8
+
+
+def test_what_only_makes_up_for_the_form_of_a_wave_is_no_candidate() -> None:
+    """Three waves to one explain what a sine lacks of a triangle, but not beside any form of it."""
+    entry = {"name": "cogging", "form": "triangle", "amplitude": 2.0, "period": 1e-4, "phase": 0.3}
+    balance = ForceBalance(stage(), load_data([run(stage(effects=[entry]), there_and_back(20.0))]))
+    base, fitter = baseline(balance), Fitter(balance)
+    model = fitter.fit([Term.of({**entry, "form": "sine"})], base)
+    seen = look(fitter, model)
+    plainly = Screen(seen.candidates, fitter).beside(model)
+
+    def most(gains: list[Screened]) -> float:
+        periods = [c.term.entry.get("period", 0.0) for c in seen.candidates]
+        thirds = [abs(3.0 * period / entry["period"] - 1.0) < 0.02 for period in periods]
+        return max(s.gain for s, third in zip(gains, thirds, strict=True) if third)
+
+    assert most(plainly) > 0.05
+    assert most(seen.screened) < 0.3 * most(plainly)
 
 
 def test_another_form_of_a_drift_has_another_course_and_what_does_not_drift_none() -> None:
