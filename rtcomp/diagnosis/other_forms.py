@@ -42,7 +42,7 @@ def other_forms(fitter: Fitter, model: Fitted) -> Floats:
     """Return the columns (q, n) of what other forms of a model's effects do."""
     found = [np.zeros((0, model.residual.size))]
     for i, entry in enumerate(model.entries):
-        found += [_bent(fitter.balance, entry, _force_of(fitter, model, i)), overtones(fitter, model, entry)]
+        found += [_bent(fitter.balance, entry, force_of(fitter, model, i)), overtones(fitter, model, entry)]
     return np.concatenate(found)
 
 
@@ -54,7 +54,7 @@ def variants(fitter: Fitter, model: Fitted, at: int) -> Floats:
     return np.concatenate([overtones(fitter, model, model.entries[at]), _courses(fitter, model, at)])
 
 
-def _force_of(fitter: Fitter, model: Fitted, at: int) -> Floats:
+def force_of(fitter: Fitter, model: Fitted, at: int) -> Floats:
     """Return the force (N, (n,)) of a model's effect number `at`."""
     return fitter.without(model, at) - fitter.force(model)
 
@@ -131,7 +131,7 @@ def _courses(fitter: Fitter, model: Fitted, at: int) -> Floats:
     balance = fitter.balance
     if not ent.goes_by_time(ent.kind_of(model.entries[at])):
         return np.zeros((0, model.residual.size))
-    force, time = _force_of(fitter, model, at), balance.plain([s.time for s in balance.data.segments])
+    force, time = force_of(fitter, model, at), balance.plain([s.time for s in balance.data.segments])
     return np.array([as_white(balance, force * bend) for bend in _bent_by(time)])
 
 
