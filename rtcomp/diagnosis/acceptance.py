@@ -41,13 +41,13 @@ def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, e
     gained = math.sqrt(before.sum()) - math.sqrt(after.sum())
     if p >= LEVEL or gained <= LEAST_GAIN * math.sqrt(everything):
         return False
-    return fitter.relative(parent) ** 2 - fitter.relative(model) ** 2 > NEGLIGIBLE**2
+    return fitter.relative(parent, seen=True) ** 2 - fitter.relative(model, seen=True) ** 2 > NEGLIGIBLE**2
 
 
 def exhausted(fitter: Fitter, model: Fitted, everything: float) -> bool:
     """Tell whether a model leaves too little for any further effect to matter."""
     little = math.sqrt(model.errors.sum()) <= LEAST_GAIN * math.sqrt(everything)
-    return little or fitter.relative(model) <= NEGLIGIBLE
+    return little or fitter.relative(model, seen=True) <= NEGLIGIBLE
 
 
 def pruned(

@@ -318,8 +318,13 @@ class ForceBalance(Signals):
 
     def force_densities(self) -> tuple[Floats, Floats, Floats]:
         """Return frequencies (Hz), the density of the drive's force and of noise (N^2/Hz), (F,) each."""
-        frequency, density = spectrum(self._drive_side([], []), self.data.rate)
-        return frequency, density, 2.0 * self.whitening.coloured(frequency) ** 2 / self.data.rate
+
+        def made() -> list[Floats]:
+            frequency, density = spectrum(self._drive_side([], []), self.data.rate)
+            return [frequency, density, 2.0 * self.whitening.coloured(frequency) ** 2 / self.data.rate]
+
+        frequency, density, noise = self._cache.of(("densities",), made)
+        return frequency, density, noise
 
     def drive_force(self) -> Floats:
         """Return the force of the believed drive (N, (n,)) below the motion's bandwidth."""

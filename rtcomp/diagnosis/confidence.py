@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from rtcomp.diagnosis.other_forms import in_any_form
 from rtcomp.diagnosis.replicates import best
 from rtcomp.diagnosis.screening import look
 from rtcomp.diagnosis.selection import Search
-from rtcomp.diagnosis.settings import ALIAS
+from rtcomp.diagnosis.settings import ALIAS, LEVEL
 from rtcomp.diagnosis.significance import confidence_set, log_gain, probabilities
 from rtcomp.kernels import Floats
 
@@ -57,20 +58,21 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         chosen, i = found.chosen, len(done)
         rest = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
         models = [chosen, *_others(fitter, found, i, rest, ends)]
-        errors = [_by_cell(fitter, m, i if m is chosen else len(m.terms) - 1) for m in models]
+        open_form = found.null is not None and found.null.p_of_error(chosen.errors) < LEVEL
+        seen = [_seen(fitter, m, i if m is chosen else len(m.terms) - 1, rest, open_form) for m in models]
+        errors, sizes = [each.errors for each in seen], [each.size for each in seen]
         rows = _independent(fitter, chosen) / errors[0].size
-        weight = probabilities(errors, rows, [m.size for m in models])
-        least = (1.0 - ALIAS) * log_gain(rest.errors, chosen.errors)
-        members = {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
+        weight = probabilities(errors, rows, sizes)
+        members = {k for k, each in enumerate(seen) if each.gain >= (1.0 - ALIAS) * seen[0].gain}
         members |= set(confidence_set(errors, SET_LEVEL))
-        plainer = min(members, key=lambda k: (models[k].size, -weight[k]))
-        if models[plainer].size < chosen.size and weight[plainer] > weight[0]:
+        plainer = min(members, key=lambda k: (sizes[k], -weight[k]))
+        if sizes[plainer] < sizes[0] and weight[plainer] > weight[0]:
             found.alternatives = [m for m in found.alternatives if m is not models[plainer]] + [chosen]
             found.chosen, found.beside, done = models[plainer], None, []
             continue
-        plainest = min(models[k].size for k in members)
-        enough = max(weight[k] for k in members if models[k].size == plainest)
-        members = {k for k in members if models[k].size == plainest or weight[k] > enough} | {0}
+        plainest = min(sizes[k] for k in members)
+        enough = max(weight[k] for k in members if sizes[k] == plainest)
+        members = {k for k in members if sizes[k] == plainest or weight[k] > enough} | {0}
         order = sorted(members, key=lambda k: (-round(float(weight[k]), DIGITS), k))  # of equals the chosen
         names = [_replaced(models[k], chosen, i) for k in order]
         kept = [j for j, n in enumerate(names) if n not in names[:j]]
@@ -87,13 +89,35 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
     return done
 
 
-def _by_cell(fitter: Fitter, model: Fitted, at: int) -> Floats:
-    """Return the squared error of a model in every cell that is not reserved, (C,).
+class _Seen(NamedTuple):
+    """A model as it is compared: its squared error in cells, its parameters, what its effect gains."""
 
-    What acts now and then, as a drive's limit, shows in some of them: of ten blocks it would be by chance.
-    That in the place `at` is compared in any form of its own.
+    errors: Floats
+    """(C,), of every cell that is not reserved."""
+    size: int
+    gain: float
+    """Logarithm of the error without the effect over that with it."""
+
+
+def _seen(fitter: Fitter, model: Fitted, at: int, rest: Fitted, open_form: bool) -> _Seen:
+    """Return a model as it is compared beside the `rest`, which lacks its effect number `at`.
+
+    What acts now and then, as a drive's limit, shows in some cells: of ten blocks it would be by chance.
+    The effect is compared in any form of its own. Where the form is `open_form`, for more than noise is left,
+    a function of position in any shape: which it is then tells nothing of what it is.
     """
-    model = in_any_form(fitter, model, fitter.variants(model, at))
+    shapes = fitter.shapes(model, at) if open_form else np.zeros((0, model.residual.size))
+    errors = _by_cell(
+        fitter, in_any_form(fitter, model, np.concatenate([fitter.variants(model, at), shapes]))
+    )
+    if not shapes.size:
+        return _Seen(errors, model.size, log_gain(rest.errors, model.errors))
+    size = model.size + shapes.shape[0] - len(model.terms[at].free)
+    return _Seen(errors, size, float(np.log(rest.sse / errors.sum())))
+
+
+def _by_cell(fitter: Fitter, model: Fitted) -> Floats:
+    """Return the squared error of a model in every cell that is not reserved, (C,)."""
     block = fitter.block
     cell = np.arange(block.size) * (fitter.blocks * CELLS) // block.size
     used = fitter.use[block]

@@ -88,11 +88,6 @@ class Data:
         found = [j for s in self.as_recorded().segments for j in jumps(s.time, s.position)]
         return sorted(found, key=lambda j: -j.clear)[:MOST]
 
-    def without_jumps(self) -> list[Floats]:
-        """Return the position (m, (K,)) of each segment without its clearest jumps: what may be motion."""
-        steps = [(j.time, j.size) for j in self.jumps]
-        return [s.position - sum(size * (s.time >= at) for at, size in steps) for s in self.segments]
-
     def as_recorded(self) -> Data:
         """Return the rows that these are means of."""
         sources = tuple(s.source or s for s in self.segments)

@@ -44,10 +44,9 @@ class Noise:
 
         Noise that is larger than all there is at some frequency is not there. Where a stage says nothing, all
         that stands in the weakest band, be it leaked from the motion, counts as noise: too much of it says
-        less, too little makes a finding of whatever is open. A jump of the reading has all frequencies, and
-        no motion.
+        less, too little makes a finding of whatever is open.
         """
-        positions, stated = data.without_jumps(), cls.stated(stage)
+        positions, stated = [s.position for s in data.segments], cls.stated(stage)
         frequency, density = (motion_spectrum if stated > 0.0 else spectrum)(positions, data.rate)
         most = float(np.sqrt(density.min() * 0.5 * data.rate))
         rms = min(max(stated, 0.1 * most), most) if stated > 0.0 else most
