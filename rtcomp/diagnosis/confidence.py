@@ -58,8 +58,16 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         chosen, i = found.chosen, len(done)
         rest = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
         models = [chosen, *_others(fitter, found, i, rest, ends)]
+        # Where more than noise is left the form is open: the shape of a function of position tells nothing.
         open_form = found.null is not None and found.null.p_of_error(chosen.errors) < LEVEL
-        seen = [_seen(fitter, m, i if m is chosen else len(m.terms) - 1, rest, open_form) for m in models]
+        places = [i if m is chosen else len(m.terms) - 1 for m in models]
+        none = np.zeros((0, chosen.residual.size))
+        shapes = [fitter.shapes(m, at) if open_form else none for m, at in zip(models, places, strict=True)]
+        any_shape = np.concatenate(shapes)
+        seen = [
+            _seen(fitter, m, at, rest, any_shape if own.size else none)
+            for m, at, own in zip(models, places, shapes, strict=True)
+        ]
         errors, sizes = [each.errors for each in seen], [each.size for each in seen]
         rows = _independent(fitter, chosen) / errors[0].size
         weight = probabilities(errors, rows, sizes)
@@ -99,14 +107,12 @@ class _Seen(NamedTuple):
     """Logarithm of the error without the effect over that with it."""
 
 
-def _seen(fitter: Fitter, model: Fitted, at: int, rest: Fitted, open_form: bool) -> _Seen:
+def _seen(fitter: Fitter, model: Fitted, at: int, rest: Fitted, shapes: Floats) -> _Seen:
     """Return a model as it is compared beside the `rest`, which lacks its effect number `at`.
 
     What acts now and then, as a drive's limit, shows in some cells: of ten blocks it would be by chance.
-    The effect is compared in any form of its own. Where the form is `open_form`, for more than noise is left,
-    a function of position in any shape: which it is then tells nothing of what it is.
+    The effect is compared in any form of its own, and in any of `shapes` (q, n).
     """
-    shapes = fitter.shapes(model, at) if open_form else np.zeros((0, model.residual.size))
     errors = _by_cell(
         fitter, in_any_form(fitter, model, np.concatenate([fitter.variants(model, at), shapes]))
     )

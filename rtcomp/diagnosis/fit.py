@@ -26,7 +26,7 @@ from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitted import Fitted, left_out
 from rtcomp.diagnosis.free import Free, Term, free_of
 from rtcomp.diagnosis.noise import Noise
-from rtcomp.diagnosis.other_forms import of_position, other_beliefs, other_forms, variants
+from rtcomp.diagnosis.other_forms import other_beliefs, other_forms, shapes, variants
 from rtcomp.diagnosis.regression import Grams, Prior
 from rtcomp.diagnosis.result import PositionFit
 from rtcomp.diagnosis.retuned import level_and_reach
@@ -127,10 +127,10 @@ class Fitter:
 
     def shapes(self, model: Fitted, at: int) -> Floats:
         """Return the columns (q, n) of any function of position, where effect number `at` is a smooth one."""
-        return of_position(self.balance, model.entries[at])
+        return shapes(self, model, at)
 
     def relative(self, model: Fitted, *, seen: bool = False) -> float:
-        """Return what a model leaves over what there is, rms, not reserved; `seen`: above the sensor's noise."""
+        """Return what a model leaves over what there is, rms, not reserved; `seen`: above the noise."""
         b, both = self.balance, (self.force(model), self.balance.drive_force())
         left, given = ((as_seen(b, f) if seen else f)[self.rows] for f in both)
         return math.sqrt(np.mean(left**2) / max(np.mean(given**2), 1e-300))
