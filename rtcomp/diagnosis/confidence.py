@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -58,16 +59,7 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         chosen, i = found.chosen, len(done)
         rest = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
         models = [chosen, *_others(fitter, found, i, rest, ends)]
-        # Where more than noise is left the form is open: the shape of a function of position tells nothing.
-        open_form = found.null is not None and found.null.p_of_error(chosen.errors) < LEVEL
-        places = [i if m is chosen else len(m.terms) - 1 for m in models]
-        none = np.zeros((0, chosen.residual.size))
-        shapes = [fitter.shapes(m, at) if open_form else none for m, at in zip(models, places, strict=True)]
-        any_shape = np.concatenate(shapes)
-        seen = [
-            _seen(fitter, m, at, rest, any_shape if own.size else none)
-            for m, at, own in zip(models, places, shapes, strict=True)
-        ]
+        seen = _compared(fitter, found, models, i, rest)
         errors, sizes = [each.errors for each in seen], [each.size for each in seen]
         rows = _independent(fitter, chosen) / errors[0].size
         weight = probabilities(errors, rows, sizes)
@@ -107,19 +99,30 @@ class _Seen(NamedTuple):
     """Logarithm of the error without the effect over that with it."""
 
 
-def _seen(fitter: Fitter, model: Fitted, at: int, rest: Fitted, shapes: Floats) -> _Seen:
-    """Return a model as it is compared beside the `rest`, which lacks its effect number `at`.
+def _compared(
+    fitter: Fitter, found: Search, models: Sequence[Fitted], place: int, rest: Fitted
+) -> list[_Seen]:
+    """Return models as they are compared beside the `rest`: the chosen one, and others with a last effect.
 
     What acts now and then, as a drive's limit, shows in some cells: of ten blocks it would be by chance.
-    The effect is compared in any form of its own, and in any of `shapes` (q, n).
+    Effects are compared in any form of their own law. Where more than noise is left the form is open: the
+    shape of a function of position tells nothing then, and each may have that of any other.
     """
-    errors = _by_cell(
-        fitter, in_any_form(fitter, model, np.concatenate([fitter.variants(model, at), shapes]))
-    )
-    if not shapes.size:
-        return _Seen(errors, model.size, log_gain(rest.errors, model.errors))
-    size = model.size + shapes.shape[0] - len(model.terms[at].free)
-    return _Seen(errors, size, float(np.log(rest.sse / errors.sum())))
+    chosen, none = models[0], np.zeros((0, rest.residual.size))
+    places = [place, *(len(m.terms) - 1 for m in models[1:])]
+    open_form = found.null is not None and found.null.p_of_error(chosen.errors) < LEVEL
+    own = [fitter.shapes(m, at) if open_form else none for m, at in zip(models, places, strict=True)]
+    shapes = np.concatenate(own)
+
+    def seen(model: Fitted, at: int, shaped: bool) -> _Seen:
+        forms = np.concatenate([fitter.variants(model, at), shapes if shaped else none])
+        errors = _by_cell(fitter, in_any_form(fitter, model, forms))
+        if not shaped:
+            return _Seen(errors, model.size, log_gain(rest.errors, model.errors))
+        size = model.size + shapes.shape[0] - len(model.terms[at].free)
+        return _Seen(errors, size, float(np.log(rest.sse / errors.sum())))
+
+    return [seen(m, at, bool(one.size)) for m, at, one in zip(models, places, own, strict=True)]
 
 
 def _by_cell(fitter: Fitter, model: Fitted) -> Floats:
