@@ -124,7 +124,7 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
             why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""
             if not why and denied(fitter, chosen, without):
                 why = NOT_SHOWN.format("simulated positions" if fitter.by_force else "forces")
-            if not why and acts_otherwise(fitter, chosen, i, without):
+            if not why and acts_otherwise(fitter, chosen, i):
                 why = NOT_SO
         said.append(Doubt(why, left))
     return said

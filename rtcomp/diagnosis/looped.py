@@ -19,18 +19,18 @@ from rtcomp.diagnosis.significance import SURE
 from rtcomp.kernels import Floats
 
 
-def acts_otherwise(fitter: Fitter, model: Fitted, at: int, without: Fitted) -> bool:
+def acts_otherwise(fitter: Fitter, model: Fitted, at: int) -> bool:
     """Tell whether effect number `at` of a model plainly acts otherwise in its loop than in the recording.
 
-    Or whether its loop loses the recorded motion, and that of the model `without` it does not. Never where
-    the recording has no reference, or the stage no controller: the recorded command acts then.
+    Never where the recording has no reference, or the stage no controller: the recorded command acts then.
+    Nor where its loop loses the recorded motion.
     """
     balance = fitter.balance
     if balance.stage.controller is None or any(s.reference is None for s in balance.data.segments):
         return False
     made = [data for data in (_replicate(fitter, model, seed) for seed in (0, 1)) if data is not None]
     if len(made) < 2:
-        return _replicate(fitter, without, 0) is not None
+        return False  # a loop that is hardly stable: numbers a little off lose it
     forces = [force_of(fitter, model, at)]
     for data in made:
         other = fitter.on(data)

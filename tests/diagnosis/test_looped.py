@@ -50,7 +50,7 @@ def test_a_limit_that_takes_away_what_friction_asked_for_acts_otherwise(
     balance = ForceBalance(stage(), load_data([run(stage(effects=[hidden]), there_and_back(20.0))]))
     base, fitter = baseline(balance), Fitter(balance)
     model = fitter.fit([Term.of(told)], base, steps=0)
-    assert acts_otherwise(fitter, model, 0, base) == otherwise
+    assert acts_otherwise(fitter, model, 0) == otherwise
 
 
 def test_without_a_loop_nothing_acts_otherwise() -> None:
@@ -59,4 +59,4 @@ def test_without_a_loop_nothing_acts_otherwise() -> None:
     del recording.columns["reference"]
     balance = ForceBalance(stage(), load_data([recording]))
     base, fitter = baseline(balance), Fitter(balance)
-    assert not acts_otherwise(fitter, fitter.fit([Term.of(LIMIT)], base, steps=0), 0, base)
+    assert not acts_otherwise(fitter, fitter.fit([Term.of(LIMIT)], base, steps=0), 0)
