@@ -15,7 +15,6 @@ from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.intervals import told
-from rtcomp.diagnosis.looped import acts_otherwise
 from rtcomp.diagnosis.other_forms import errors_beside, in_any_form
 from rtcomp.diagnosis.settings import LEAST_GAIN, LEFT, LEVEL, NEGLIGIBLE
 from rtcomp.diagnosis.significance import Null, log_gain
@@ -24,7 +23,6 @@ PLAINER = 1e-3
 """Logarithm of the error that one parameter more must gain to count at all."""
 TOO_MUCH = "{:.0f} % of what there is without it is left, more than noise"
 NOT_SHOWN = "it does not show in {}"
-NOT_SO = "in a simulated loop with it, it acts otherwise than in the recording"
 
 
 def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, everything: float) -> bool:
@@ -102,8 +100,7 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
 
     Its size may be nothing, a number of it is at a physical bound, or more is left beside it than noise and a
     part of what there is without it: what else makes the rest may make that part as well. What replicates of
-    the model leave too is not counted as left. Or it does not show elsewhere: in the other objective, in a
-    simulated loop.
+    the model leave too is not counted as left. Or it does not show in the other objective.
     """
     said = []
     louder = fitter.louder(chosen)
@@ -124,7 +121,5 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
             why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""
             if not why and denied(fitter, chosen, without):
                 why = NOT_SHOWN.format("simulated positions" if fitter.by_force else "forces")
-            if not why and acts_otherwise(fitter, chosen, i):
-                why = NOT_SO
         said.append(Doubt(why, left))
     return said

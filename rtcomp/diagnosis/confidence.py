@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +17,7 @@ from rtcomp.diagnosis.other_forms import in_any_form
 from rtcomp.diagnosis.replicates import best
 from rtcomp.diagnosis.screening import look
 from rtcomp.diagnosis.selection import Search
-from rtcomp.diagnosis.settings import ALIAS, LEVEL
+from rtcomp.diagnosis.settings import ALIAS
 from rtcomp.diagnosis.significance import confidence_set, log_gain, probabilities
 from rtcomp.kernels import Floats
 
@@ -59,20 +57,20 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         chosen, i = found.chosen, len(done)
         rest = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
         models = [chosen, *_others(fitter, found, i, rest, ends)]
-        seen = _compared(fitter, found, models, i, rest)
-        errors, sizes = [each.errors for each in seen], [each.size for each in seen]
+        errors = [_by_cell(fitter, m, i if m is chosen else len(m.terms) - 1) for m in models]
         rows = _independent(fitter, chosen) / errors[0].size
-        weight = probabilities(errors, rows, sizes)
-        members = {k for k, each in enumerate(seen) if each.gain >= (1.0 - ALIAS) * seen[0].gain}
+        weight = probabilities(errors, rows, [m.size for m in models])
+        least = (1.0 - ALIAS) * log_gain(rest.errors, chosen.errors)
+        members = {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
         members |= set(confidence_set(errors, SET_LEVEL))
-        plainer = min(members, key=lambda k: (sizes[k], -weight[k]))
-        if sizes[plainer] < sizes[0] and weight[plainer] > weight[0]:
+        plainer = min(members, key=lambda k: (models[k].size, -weight[k]))
+        if models[plainer].size < chosen.size and weight[plainer] > weight[0]:
             found.alternatives = [m for m in found.alternatives if m is not models[plainer]] + [chosen]
             found.chosen, found.beside, done = models[plainer], None, []
             continue
-        plainest = min(sizes[k] for k in members)
-        enough = max(weight[k] for k in members if sizes[k] == plainest)
-        members = {k for k in members if sizes[k] == plainest or weight[k] > enough} | {0}
+        plainest = min(models[k].size for k in members)
+        enough = max(weight[k] for k in members if models[k].size == plainest)
+        members = {k for k in members if models[k].size == plainest or weight[k] > enough} | {0}
         order = sorted(members, key=lambda k: (-round(float(weight[k]), DIGITS), k))  # of equals the chosen
         names = [_replaced(models[k], chosen, i) for k in order]
         kept = [j for j, n in enumerate(names) if n not in names[:j]]
@@ -89,44 +87,13 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
     return done
 
 
-class _Seen(NamedTuple):
-    """A model as it is compared: its squared error in cells, its parameters, what its effect gains."""
+def _by_cell(fitter: Fitter, model: Fitted, at: int) -> Floats:
+    """Return the squared error of a model in every cell that is not reserved, (C,).
 
-    errors: Floats
-    """(C,), of every cell that is not reserved."""
-    size: int
-    gain: float
-    """Logarithm of the error without the effect over that with it."""
-
-
-def _compared(
-    fitter: Fitter, found: Search, models: Sequence[Fitted], place: int, rest: Fitted
-) -> list[_Seen]:
-    """Return models as they are compared beside the `rest`: the chosen one, and others with a last effect.
-
-    What acts now and then, as a drive's limit, shows in some cells: of ten blocks it would be by chance.
-    Effects are compared in any form of their own law. Where more than noise is left the form is open: the
-    shape of a function of position tells nothing then, and each may have that of any other.
+    What acts now and then, as a drive's limit, shows in some of them: of ten blocks it would be by chance.
+    That in the place `at` is compared in any form of its own.
     """
-    chosen, none = models[0], np.zeros((0, rest.residual.size))
-    places = [place, *(len(m.terms) - 1 for m in models[1:])]
-    open_form = found.null is not None and found.null.p_of_error(chosen.errors) < LEVEL
-    own = [fitter.shapes(m, at) if open_form else none for m, at in zip(models, places, strict=True)]
-    shapes = np.concatenate(own)
-
-    def seen(model: Fitted, at: int, shaped: bool) -> _Seen:
-        forms = np.concatenate([fitter.variants(model, at), shapes if shaped else none])
-        errors = _by_cell(fitter, in_any_form(fitter, model, forms))
-        if not shaped:
-            return _Seen(errors, model.size, log_gain(rest.errors, model.errors))
-        size = model.size + shapes.shape[0] - len(model.terms[at].free)
-        return _Seen(errors, size, float(np.log(rest.sse / errors.sum())))
-
-    return [seen(m, at, bool(one.size)) for m, at, one in zip(models, places, own, strict=True)]
-
-
-def _by_cell(fitter: Fitter, model: Fitted) -> Floats:
-    """Return the squared error of a model in every cell that is not reserved, (C,)."""
+    model = in_any_form(fitter, model, fitter.variants(model, at))
     block = fitter.block
     cell = np.arange(block.size) * (fitter.blocks * CELLS) // block.size
     used = fitter.use[block]

@@ -26,7 +26,7 @@ from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitted import Fitted, left_out
 from rtcomp.diagnosis.free import Free, Term, free_of
 from rtcomp.diagnosis.noise import Noise
-from rtcomp.diagnosis.other_forms import other_beliefs, other_forms, shapes, variants
+from rtcomp.diagnosis.other_forms import other_beliefs, other_forms, variants
 from rtcomp.diagnosis.regression import Grams, Prior
 from rtcomp.diagnosis.result import PositionFit
 from rtcomp.diagnosis.retuned import level_and_reach
@@ -124,10 +124,6 @@ class Fitter:
     def variants(self, model: Fitted, at: int) -> Floats:
         """Return the columns (q, n) that another form of its effect number `at` would add by its own law."""
         return variants(self, model, at)
-
-    def shapes(self, model: Fitted, at: int) -> Floats:
-        """Return the columns (q, n) of any function of position, where effect number `at` is a smooth one."""
-        return shapes(self, model, at)
 
     def relative(self, model: Fitted, *, seen: bool = False) -> float:
         """Return what a model leaves over what there is, rms, not reserved; `seen`: above the noise."""

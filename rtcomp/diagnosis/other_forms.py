@@ -54,18 +54,6 @@ def variants(fitter: Fitter, model: Fitted, at: int) -> Floats:
     return np.concatenate([overtones(fitter, model, model.entries[at]), _courses(fitter, model, at)])
 
 
-def shapes(fitter: Fitter, model: Fitted, at: int) -> Floats:
-    """Return the columns (q, n) of any function of position, where effect number `at` is a smooth one.
-
-    Its own shape is one of them, and what that may be with other numbers.
-    """
-    found = of_position(fitter.balance, model.entries[at])
-    if not found.size:
-        return found
-    own = [row for row, free in zip(model.tangents, model.free, strict=True) if free.term == at]
-    return np.array([*found, as_white(fitter.balance, force_of(fitter, model, at)), *own])
-
-
 def force_of(fitter: Fitter, model: Fitted, at: int) -> Floats:
     """Return the force (N, (n,)) of a model's effect number `at`."""
     return fitter.without(model, at) - fitter.force(model)

@@ -121,10 +121,6 @@ class Trajectory(Fitter):
         """See `other_forms`."""
         return np.zeros((0, model.residual.size))
 
-    def shapes(self, model: Fitted, at: int) -> Floats:
-        """See `other_forms`."""
-        return np.zeros((0, model.residual.size))
-
     def relative(self, model: Fitted, *, seen: bool = False) -> float:
         """See `Fitter`: error over the way that forces moved the axis; it counts by noise anyway."""
         return float(np.sqrt(np.sum(model.residual[self.rows] ** 2) / max(self._power, 1e-300)))

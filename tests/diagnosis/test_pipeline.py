@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from recorded import RATE, changed, run, stage, there_and_back
+from recorded import RATE, run, stage, there_and_back
 
 from rtcomp.diagnosis.pipeline import diagnose, outdone
 from rtcomp.diagnosis.result import Diagnosis
@@ -64,16 +64,6 @@ def test_a_dead_zone_is_named_with_its_width(belief: Stage) -> None:
     width = found.effects[0].parameters["width"]
     assert width.low <= 0.3 <= width.high and width.high - width.low < 0.03
     assert found.fit.after < 0.1 * found.fit.before
-
-
-def test_a_spring_of_another_shape_is_not_surely_a_wave() -> None:
-    """One whose force goes by x |x|: the command makes up for it. It may be both, for the form is open."""
-    believed = stage(effects=[{"name": "parallel-spring", "stiffness": 2000.0}])
-    plain = run(believed, motion())
-    force = 4e6 * plain.position * np.abs(plain.position)
-    found = diagnose(believed, [changed(plain, voltage=plain.voltage + force / 4.0)], budget=300.0)
-    assert "parallel-spring" in names(found)[0]
-    assert all(len(e.names) > 1 or e.names[0] in ("parallel-spring", "unexplained") for e in found.effects)
 
 
 def test_a_slow_lag_of_friction_is_found_far_from_nothing() -> None:
