@@ -20,14 +20,13 @@ from rtcomp.diagnosis.candidates import started
 from rtcomp.diagnosis.data import MOST_ROWS, load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.other_forms import errors_beside, overtones
 from rtcomp.diagnosis.regression import Grams
 from rtcomp.diagnosis.replicate import replicate
 from rtcomp.diagnosis.scales import tones_of
-from rtcomp.diagnosis.screening import Screen, Screened, look
+from rtcomp.diagnosis.screening import look
 from rtcomp.diagnosis.stage_of import stage_of
 from rtcomp.diagnosis.validation import Reserved
-from rtcomp.diagnosis.where import as_force, as_seen, as_white, noise_seen
+from rtcomp.diagnosis.where import as_force, as_seen, noise_seen
 from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.physics import Effect, catalogue
 from rtcomp.stage.balance import between_rows
@@ -198,115 +197,6 @@ def test_a_fit_is_blind_to_reserved_rows() -> None:
     found = grams.solve(fitter.use, fitted.prior, fitted.variance)
     assert found == pytest.approx(fitted.coefficients, rel=0.05, abs=1.0)
     assert grams.errors(found, fitter.use).sum() == pytest.approx(fitted.sse, rel=1e-3)
-
-
-@pytest.mark.parametrize("name", ["cogging", "torque-ripple", "position-dependent-friction"])
-def test_another_form_of_a_wave_has_its_overtones_and_no_other_waves(name: str) -> None:
-    believed = stage()
-    balance = ForceBalance(believed, load_data([run(believed, there_and_back(20.0))]))
-    fitter, fitted = Fitter(balance), baseline(balance)
-    entry = {"name": name, "amplitude": 0.01, "period": 1e-4, "phase": 0.3}
-    columns = overtones(fitter, fitted, entry)
-
-    def left(period: float) -> float:
-        other = {**entry, "period": period, "phase": 1.1}
-        wave = fitter.units([other])[0] if name == "cogging" else fitter.change(fitted, other)
-        rest = wave - np.linalg.lstsq(columns.T, wave, rcond=None)[0] @ columns
-        return float(np.linalg.norm(rest) / np.linalg.norm(wave))
-
-    assert left(0.5e-4) < 0.01
-    assert left(1.002 * 0.5e-4) < 0.3
-    assert left(2.0e-4) < 0.03
-    assert left(0.77e-4) > 0.8
-
-
-def test_what_only_makes_up_for_the_form_of_a_wave_is_no_candidate() -> None:
-    """Three waves to one explain what a sine lacks of a triangle, but not beside any form of it."""
-    entry = {"name": "cogging", "form": "triangle", "amplitude": 2.0, "period": 1e-4, "phase": 0.3}
-    balance = ForceBalance(stage(), load_data([run(stage(effects=[entry]), there_and_back(20.0))]))
-    base, fitter = baseline(balance), Fitter(balance)
-    model = fitter.fit([Term.of({**entry, "form": "sine"})], base)
-    seen = look(fitter, model)
-    plainly = Screen(seen.candidates, fitter).beside(model)
-
-    def most(gains: list[Screened]) -> float:
-        periods = [c.term.entry.get("period", 0.0) for c in seen.candidates]
-        thirds = [abs(3.0 * period / entry["period"] - 1.0) < 0.02 for period in periods]
-        return max(s.gain for s, third in zip(gains, thirds, strict=True) if third)
-
-    assert most(plainly) > 0.05
-    assert most(seen.screened) < 0.3 * most(plainly)
-
-
-def test_another_form_of_a_drift_has_another_course_and_what_does_not_drift_none() -> None:
-    """Fast at first in place of as fast all the time; not so friction that falls with speed."""
-    drifts = {"name": "friction-drift", "form": "linear", "change": 0.4, "time_constant": 20.0}
-    falls = {"name": "stribeck", "rise": 0.3, "velocity": 2e-3}
-    for entry, none in ((drifts, False), (falls, True)):
-        recording = run(stage(effects=[entry]), there_and_back(20.0))
-        balance = ForceBalance(stage(), load_data([recording]))
-        base, fitter = baseline(balance), Fitter(balance)
-        model = fitter.fit([Term.of(entry)], base)
-        forms = fitter.variants(model, 0)
-        assert (forms.size == 0) == none
-        if not none:
-            other = fitter.change(base, {**entry, "form": "level", "time_constant": 6.0})
-            columns = np.concatenate([forms, model.tangents, fitter.change(base, entry)[None, :]])
-            rest = other - np.linalg.lstsq(columns.T, other, rcond=None)[0] @ columns
-            assert np.linalg.norm(rest) < 0.15 * np.linalg.norm(other)
-
-
-@pytest.mark.parametrize(("waves", "told"), [(0.5, False), (1.0, False), (3.0, True), (4.0, True)])
-def test_another_function_of_position_is_told_from_a_spring_where_it_repeats(
-    waves: float, told: bool
-) -> None:
-    """Within the stroke: else any form of spring may be it, as one that goes by x |x|."""
-    believed = stage(effects=[{"name": "parallel-spring", "stiffness": 2000.0}])
-    balance = ForceBalance(believed, load_data([run(believed, there_and_back(20.0))]))
-    fitter, fitted = Fitter(balance), baseline(balance)
-    forms = fitter.other_forms(fitted, "cogging")
-    position = balance.plain([p.x for p in balance.paths()])
-    low, high = float(position.min()), float(position.max())
-
-    def left(force: np.ndarray) -> float:
-        white = as_white(balance, force)
-        return float(
-            np.linalg.norm(white - np.linalg.lstsq(forms.T, white)[0] @ forms) / np.linalg.norm(white)
-        )
-
-    middle = position - 0.5 * (low + high)
-    assert (left(np.sin(2.0 * np.pi * waves * middle / (high - low))) > 0.2) == told
-    assert left(middle * np.abs(middle)) < 0.03
-    assert not fitter.other_forms(fitted, "parallel-spring").size
-
-
-@pytest.mark.parametrize(
-    "entry", [{"name": "constant-force", "force": 3.0}, {"name": "drive-offset", "offset": 0.3}]
-)
-def test_a_constant_has_no_other_form(entry: dict[str, Any]) -> None:
-    """Neither a found nor a believed one: bent along position it would be any spring."""
-    plain, pushed = stage(), stage(effects=[entry])
-    run_with = run(pushed, there_and_back(20.0))
-    balance = ForceBalance(plain, load_data([run_with]))
-    baseline(balance)
-    fitter = Fitter(balance)
-    found = fitter.fit([Term.of(entry)])
-    assert found.terms[0].entry["name"] == entry["name"]
-    assert not fitter.other_forms(found, "parallel-spring").size
-    believed = ForceBalance(pushed, load_data([run_with]))
-    assert not Fitter(believed).other_forms(baseline(believed), "parallel-spring").size
-
-
-def test_other_forms_beside_a_model_do_not_make_it_a_poorer_one() -> None:
-    """What is fitted to noise predicts blocks left out worse: no further effect is better for that."""
-    believed = stage()
-    balance = ForceBalance(believed, load_data([run(believed, there_and_back(20.0))]))
-    fitter, fitted = Fitter(balance), baseline(balance)
-    random = np.random.default_rng(3)
-    some = 100.0 * random.standard_normal((20, fitted.residual.size))
-    assert np.all(errors_beside(fitter, fitted, some) == fitted.errors)
-    some[0] = fitted.residual + 0.3 * np.std(fitted.residual) * random.standard_normal(fitted.residual.size)
-    assert np.log(errors_beside(fitter, fitted, 100.0 * some[:1])).mean() < np.log(fitted.errors).mean() - 1.0
 
 
 def test_what_was_made_of_a_recording_goes_with_it() -> None:
