@@ -18,6 +18,7 @@ from rtcomp.diagnosis.intervals import told
 from rtcomp.diagnosis.other_forms import errors_beside, in_any_form
 from rtcomp.diagnosis.settings import LEAST_GAIN, LEFT, LEVEL, NEGLIGIBLE
 from rtcomp.diagnosis.significance import Null, log_gain
+from rtcomp.kernels import Floats
 
 PLAINER = 1e-3
 """Logarithm of the error that one parameter more must gain to count at all."""
@@ -107,15 +108,13 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
     more = null is not None and null.p_of_error(chosen.errors) < LEVEL
     noise = null.noise if null is not None else 0.0
     beyond = max(1.0 - noise / max(float(chosen.errors.sum()), 1e-300), 0.0)
-    # A wave of any form is the same effect, or a drift of any course: what only makes it another is not left.
-    others = [fitter.variants(chosen, i) for i in range(len(chosen.terms))]
-    rest = in_any_form(fitter, chosen, np.concatenate([np.zeros((0, chosen.residual.size)), *others]))
     for i, span in enumerate(told(fitter, chosen)):
         why = "its size may be nothing" if span.nothing else ""
         why = f"{', '.join(span.bound)} at its bound" if span.bound else why
         left = 1.0
         if not why:
             without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
+            rest = in_any_form(fitter, chosen, _only_forms(fitter, chosen, i))
             left, there = (fitter.above_noise(model, louder) ** 2 for model in (rest, without))
             left *= beyond / max(there, 1e-300)
             why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""
@@ -123,3 +122,12 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
                 why = NOT_SHOWN.format("simulated positions" if fitter.by_force else "forces")
         said.append(Doubt(why, left))
     return said
+
+
+def _only_forms(fitter: Fitter, chosen: Fitted, at: int) -> Floats:
+    """Return the columns (q, n) of what makes no effect number `at` doubtful where it is left.
+
+    A wave of any form is the same effect, or a drift of any course; and the others may be of another form.
+    """
+    forms = [fitter.forms_of(chosen, j) for j in range(len(chosen.terms)) if j != at]
+    return np.concatenate([fitter.variants(chosen, at), *forms])

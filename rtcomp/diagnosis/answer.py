@@ -18,6 +18,7 @@ from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.intervals import Told, believed_sizes, numbers, told
 from rtcomp.diagnosis.locate import locate
+from rtcomp.diagnosis.other_forms import in_any_form
 from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
 from rtcomp.diagnosis.retuned import Numbers, all_by_one_factor, force_constant, retunings
 from rtcomp.diagnosis.selection import Search
@@ -46,7 +47,7 @@ class Rest:
     def of(cls, fitter: Fitter, found: Search) -> Rest:
         """Measure it against the replicates of the chosen model."""
         error, first = float(found.chosen.errors.sum()), float(found.baseline.errors.sum())
-        relative = fitter.above_noise(found.chosen)
+        relative = fitter.above_noise(in_any_form(fitter, found.chosen, fitter.other_friction(found.chosen)))
         if found.null is None:
             return cls(relative > TOLERANCE, 1.0 if not found.chosen.terms else error / first)
         noise = found.null.noise

@@ -20,22 +20,18 @@ from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
-from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.free import Term, first_order
 from rtcomp.diagnosis.scales import Scales
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Parameter, catalogue
 
-SMALL = 0.05
-"""Size of a dimensionless parameter at which its first-order effect is looked at."""
 NOT_IN_PROPORTION = ("s", "V")
 """Units of what shifts or cuts a signal: far from neutral it does not act in proportion; tried there too."""
 LIKELY = 2
 """Start values at which the further forms of an effect are looked at."""
 FORCES, MOMENTS = "N", "N m"
 """Units of an effect that is a force on a linear axis and a moment on a rotary one."""
-POINT = 1e-2
-"""Relative size of a step that is taken to be first order."""
 
 
 @dataclass(frozen=True)
@@ -101,11 +97,11 @@ def candidates(
     events: bool = False,
     ends: float = math.inf,
     known: Sequence[Candidate] = (),
-    gains: Callable[[Sequence[Candidate]], Sequence[float]] | None = None,
+    explained: Callable[[Sequence[Candidate]], Floats] | None = None,
 ) -> list[Candidate]:
     """Return every candidate beside a fitted model, with the columns it would add to it.
 
-    In further forms where `gains` tells what candidates explain.
+    In further forms where `explained` tells how much candidates take away.
 
     With `events`, those only that happen once, at a moment that the residual shows. Those not made until the
     time `ends` (time.monotonic) are left out; every effect's first start comes before the others. What is
@@ -135,16 +131,18 @@ def candidates(
     own = {kind: [p for p in found[1:] if _first_form(kind, p)] for kind, found in points.items()}
     more = [(kind, point) for kind, found in own.items() for point in found if kind.name in names]
     shown += [c for c in shared(make, more) if c is not None]
-    # A form differs in shape, not in where it is: the others are looked at where the first does most.
+    # A form differs in shape, not in where it is: the others are looked at where the first does most. Courses
+    # in time differ in when they are.
     forms = {kind: [p for p in found[1:] if not _first_form(kind, p)] for kind, found in points.items()}
-    if gains is None or not any(forms.values()):
+    if explained is None or not shown or not any(forms.values()):
         return shown
-    likely = _likely(shown, gains(shown))
+    likely = _likely(shown, explained(shown))
     others = [
         (kind, point)
         for kind, found in forms.items()
         for point in found
-        if any(_alike(kind, point[0], e) for e in likely.get(kind.name, []))
+        if kind.name in likely
+        and (ent.goes_by_time(kind) or any(_alike(kind, point[0], e) for e in likely[kind.name]))
     ]
     return [*shown, *(c for c in shared(make, others) if c is not None)]
 
@@ -157,10 +155,10 @@ def _first_form(kind: type[Effect], point: tuple[Entry, str]) -> bool:
     return point[0].get("form", "") in ("", *list(kind.forms)[:1])
 
 
-def _likely(shown: Sequence[Candidate], gains: Sequence[float]) -> dict[str, list[Entry]]:
+def _likely(shown: Sequence[Candidate], explained: Floats) -> dict[str, list[Entry]]:
     """Return the start values of each effect that explain most."""
     found: dict[str, list[Entry]] = {}
-    for i in np.argsort(-np.asarray(gains), kind="stable").tolist():
+    for i in np.argsort(-explained, kind="stable").tolist():
         found.setdefault(shown[i].name, []).append(shown[i].term.entry)
     return {name: entries[:LIKELY] for name, entries in found.items()}
 
@@ -236,7 +234,7 @@ def _candidate(
             change = fitter.change(fitted, entry)[None, :]
             return _finite(Candidate(Term.of(entry), (entry,), change, np.zeros(1), np.full(1, np.inf)))
         p = ent.parameter(kind, linear)
-        step, most = _step(p, fitter.balance), ent.highest(entry, p)
+        step, most = first_order(p, fitter.balance), ent.highest(entry, p)
         phases = [p.name for p in kind.parameters if p.unit == ent.PHASE]
         if _waves_of(kind, linear):
             parts = [{**entry, linear: step, phases[0]: angle} for angle in (0.0, 0.5 * np.pi)]
@@ -247,7 +245,8 @@ def _candidate(
             parts = [{**entry, linear: step}]
             dead = {p.name for p in kind.parameters if p.unit == ent.PHASE or p.name == ent.PERIOD}
             own = {p.name for p in kind.parameters if p.name in entry}
-            term = Term(entry, frozenset(own - set(kind.linear) - (dead if phases else set())) | {linear})
+            others = set(kind.linear) if phases or not ent.adds_force(kind) else set()
+            term = Term(entry, frozenset(own - others - (dead if phases else set())) | {linear})
             low, high = (
                 np.array([(p.lowest - entry[linear]) / step]),
                 np.array([(most - entry[linear]) / step]),
@@ -289,23 +288,3 @@ def started(candidate: Candidate, sizes: Floats) -> Term:
         value = neutral + float(sizes[0]) * (float(candidate.parts[0][name]) - neutral)
         out[name] = min(max(value, 0.9 * p.lowest), 0.9 * ent.highest(entry, p))
     return candidate.term.with_entry(out)
-
-
-def _step(p: Parameter, balance: ForceBalance) -> float:
-    """Return a size of a linear parameter that is first order and above rounding."""
-    data = balance.data
-    volts = float(np.sqrt(np.mean(np.concatenate([s.voltage for s in data.segments]) ** 2)))
-    low, high = data.stroke
-    scale = {
-        "m": POINT * (high - low),
-        "s": data.period,
-        "V": SMALL * volts,
-        "1": SMALL,
-        "1/m": SMALL / (high - low),
-    }
-    force = balance.stage.force_constant * volts
-    forces = {"N": force, "N s/m": force / max(high - low, 1e-12)}
-    size = scale.get(p.unit, SMALL * forces.get(p.unit, 1.0))
-    if p.unit == "m":
-        size = max(3.0 * balance.noise.rms, 1e-4 * (high - low))
-    return min(size, 0.5 * p.high)

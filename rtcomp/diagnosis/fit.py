@@ -20,11 +20,10 @@ from rtcomp.diagnosis.at_hand import by_weights, consistent, goes_by_whole, newl
 from rtcomp.diagnosis.balance import BASE, ForceBalance, System
 from rtcomp.diagnosis.believed import prior_of
 from rtcomp.diagnosis.cache import KEPT_ONCE, Cache
-from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.data import Data
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitted import Fitted, left_out
-from rtcomp.diagnosis.free import Free, Term, free_of
+from rtcomp.diagnosis.free import Free, Term, free_of, slopes
 from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.other_forms import other_beliefs, other_forms, variants
 from rtcomp.diagnosis.regression import Grams, Prior
@@ -118,8 +117,17 @@ class Fitter:
 
     def other_forms(self, model: Fitted, besides: str) -> Floats:
         """Return the columns (q, n) of what other forms of its effects do, but of that which is `besides`."""
-        own = self._forms.of(model, lambda: [other_forms(self, model)])
+        own = [self.forms_of(model, i) for i in range(len(model.terms))]
         return np.concatenate([other_beliefs(self.balance, model, besides), *own])
+
+    def other_friction(self, model: Fitted) -> Floats:
+        """Return the columns (q, n) of friction of another shape than believed: none, the grid's is free."""
+        return np.zeros((0, model.residual.size))
+
+    def forms_of(self, model: Fitted, at: int) -> Floats:
+        """Return the columns (q, n) of what other forms of its effect number `at` do."""
+        made = self._forms.of(model, lambda: [other_forms(self, model, i) for i in range(len(model.terms))])
+        return np.asarray(made[at])
 
     def variants(self, model: Fitted, at: int) -> Floats:
         """Return the columns (q, n) that another form of its effect number `at` would add by its own law."""
@@ -325,20 +333,5 @@ class Fitter:
         self, terms: list[Term], free: Sequence[Free], system: System, c: Floats, weights: Floats
     ) -> Floats:
         """Return what the model changes by with each free parameter, (q, n), coefficients held."""
-        rest = system.y - c @ system.columns
-
-        def one(f: Free) -> Floats:
-            for way in (1.0, -1.0):
-                trial = list(terms)
-                f.put(trial, f.get(terms) + way * f.step)
-                moved = f.get(trial) - f.get(terms)
-                if moved == 0.0:
-                    continue
-                try:
-                    other = self.balance.error([t.entry for t in trial], c, weights)
-                except ConfigError:
-                    continue
-                return (rest - other) / moved
-            return np.zeros_like(rest)
-
-        return np.array(shared(one, free)) if free else np.zeros((0, system.y.size))
+        b, rest = self.balance, system.y - c @ system.columns
+        return slopes(terms, free, lambda t: rest - b.error([one.entry for one in t], c, weights), rest.size)

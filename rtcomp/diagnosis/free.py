@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.entries import Entry
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats
+from rtcomp.physics import Parameter
 
 LONGEST = 1.25
 """Longest period of a wave, relative to the stroke."""
+SMALL = 0.05
+"""Size of a parameter, over that of the drive's force or of 1, that is taken to be first order."""
 AT_BOUND = 1e-3
 """Part of a number by which it may be away from its bound and still be at it."""
 
@@ -92,7 +100,9 @@ def _free_of(terms: Sequence[Term], balance: ForceBalance, *, sizes: bool) -> li
             value, least, most = float(term.entry[p.name]), p.lowest, ent.highest(term.entry, p)
             log = p.lowest >= 0.0 and value > 0.0
             step = 0.02 if log else max(0.02 * abs(value), 1e-9 * (high - low if p.unit == "m" else 1.0))
-            if p.unit == ent.PHASE:
+            if p in own:
+                step = max(step, 0.2 * first_order(p, balance))
+            elif p.unit == ent.PHASE:
                 step = 0.05
             elif p.name == ent.PERIOD:
                 # A wave longer than the stroke is a slope by another name.
@@ -110,3 +120,47 @@ def _free_of(terms: Sequence[Term], balance: ForceBalance, *, sizes: bool) -> li
             told = p.unit != "Hz" or p.default is None
             found.append(Free(i, p.name, least, most, log, step, told))
     return found
+
+
+def slopes(
+    terms: list[Term], free: Sequence[Free], changed: Callable[[list[Term]], Floats], rows: int
+) -> Floats:
+    """Return what a model changes by with each free parameter, (q, rows); `changed` tells it for any terms.
+
+    0 for a parameter that cannot be moved.
+    """
+
+    def one(f: Free) -> Floats:
+        for way in (f.step, -f.step):
+            trial = list(terms)
+            f.put(trial, f.get(terms) + way)
+            moved = f.get(trial) - f.get(terms)
+            if moved == 0.0:
+                continue
+            try:
+                return changed(trial) / moved
+            except ConfigError:
+                continue
+        return np.zeros(rows)
+
+    return np.array(shared(one, free)) if free else np.zeros((0, rows))
+
+
+def first_order(p: Parameter, balance: ForceBalance) -> float:
+    """Return a size of a linear parameter that is first order and above rounding, by its unit."""
+    data = balance.data
+    volts = float(np.sqrt(np.mean(np.concatenate([s.voltage for s in data.segments]) ** 2)))
+    low, high = data.stroke
+    stroke = max(high - low, 1e-12)
+    force = balance.stage.force_constant * volts
+    scale = {
+        "m": max(3.0 * balance.noise.rms, 1e-4 * (high - low)),
+        "s": data.period,
+        "V": SMALL * volts,
+        "1/m": SMALL / stroke,
+        "N": SMALL * force,
+        "N s/m": SMALL * force / stroke,
+        "N/m": SMALL * force / (0.5 * stroke),
+        "N/m^3": SMALL * force / (0.5 * stroke) ** 3,
+    }
+    return min(scale.get(p.unit, SMALL), 0.5 * p.high)

@@ -38,12 +38,11 @@ LONGER = 0.02
 is biased."""
 
 
-def other_forms(fitter: Fitter, model: Fitted) -> Floats:
-    """Return the columns (q, n) of what other forms of a model's effects do."""
-    found = [np.zeros((0, model.residual.size))]
-    for i, entry in enumerate(model.entries):
-        found += [_bent(fitter.balance, entry, force_of(fitter, model, i)), overtones(fitter, model, entry)]
-    return np.concatenate(found)
+def other_forms(fitter: Fitter, model: Fitted, at: int) -> Floats:
+    """Return the columns (q, n) of what other forms of a model's effect number `at` do."""
+    entry = model.entries[at]
+    bent = _bent(fitter.balance, entry, force_of(fitter, model, at))
+    return np.concatenate([bent, overtones(fitter, model, entry)])
 
 
 def variants(fitter: Fitter, model: Fitted, at: int) -> Floats:

@@ -24,7 +24,7 @@ from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.result import Diagnosis, Place
 from rtcomp.diagnosis.screening import Look, look
 from rtcomp.diagnosis.selection import LOOKED, Search, search, until
-from rtcomp.diagnosis.settings import BUDGET, LEAST_GAIN
+from rtcomp.diagnosis.settings import BUDGET, LEAST_GAIN, LEFT
 from rtcomp.diagnosis.sticking import hides, part_untold, sticks
 from rtcomp.diagnosis.trajectory import Trajectory
 from rtcomp.diagnosis.validation import Reserved
@@ -204,6 +204,8 @@ def _searched(
 
     What is missing may hide which way the command goes between rows, and the wrong way looks like a delay.
     The other is searched where a model found fits better there, or where the first leaves more than noise.
+    Where both do, the second must leave as little of what the first leaves as an effect of what there is
+    without it.
     """
     best = objectives[0]
 
@@ -224,4 +226,4 @@ def _searched(
     if found.doubted or not Rest.of(fitter, other).significant:
         return fitter, other
     left = [_left(one.balance, by.chosen) for one, by in ((best.fitter, found), (fitter, other))]
-    return (fitter, other) if left[1] < left[0] else (best.fitter, found)
+    return (fitter, other) if left[1] < left[0] + math.log(LEFT) else (best.fitter, found)

@@ -93,12 +93,7 @@ class Screen:
         """
         if not self.candidates:
             return []
-        norm = np.sqrt(np.einsum("ij,ij->i", model, model))
-        model = model / np.where(norm > 0.0, norm, 1.0)[:, None]
-        parts = [_Part.of(model[:, a:b], self._columns[:, a:b], residual[a:b]) for a, b in
-                 (self._edges[k] for k in self._use)]  # fmt: skip
-        whole = _Part(*(sum(getattr(p, n) for p in parts) for n in _Part.__annotations__))
-        own = sum(self._own, np.zeros_like(self._own[0]))
+        parts, whole, own = self._parts(model, residual)
         sizes, _, _ = self._sized(whole, own)
         before, after = np.empty(len(parts)), np.empty((len(self.candidates), len(parts)))
         for j, part in enumerate(parts):
@@ -119,6 +114,24 @@ class Screen:
             Screened(float(g), d[:n] / s[:n])
             for g, d, s, n in zip(gain, sizes, self._scale, self._sizes, strict=True)
         ]
+
+    def explained(self, model: Fitted) -> Floats:
+        """Return the squared residual (C,) that each candidate takes away beside a model, in sample."""
+        _, whole, own = self._parts(self.columns_beside(model), model.residual)
+        sizes, base, solved = self._sized(whole, own)
+        inner = own - np.einsum("pcq,pcr->cqr", whole.ad[:, self._index], solved[:, self._index])
+        target = (whole.dr - base @ whole.ad)[self._index]
+        curved = np.einsum("cq,cqr,cr->c", sizes, inner, sizes)
+        return np.asarray(2.0 * np.einsum("cq,cq->c", sizes, target) - curved)
+
+    def _parts(self, model: Floats, residual: Floats) -> tuple[list[_Part], _Part, Floats]:
+        """Return products with columns `model` (p, n), scaled, by block and in all, and candidates' own."""
+        norm = np.sqrt(np.einsum("ij,ij->i", model, model))
+        model = model / np.where(norm > 0.0, norm, 1.0)[:, None]
+        parts = [_Part.of(model[:, a:b], self._columns[:, a:b], residual[a:b]) for a, b in
+                 (self._edges[k] for k in self._use)]  # fmt: skip
+        whole = _Part(*(sum(getattr(p, n) for p in parts) for n in _Part.__annotations__))
+        return parts, whole, np.asarray(sum(self._own, np.zeros_like(self._own[0])))
 
     def _sized(self, part: _Part, own: Floats) -> tuple[Floats, Floats, Floats]:
         """Return sizes (C, Q) of candidates fitted with the model, its sizes alone, candidates through it."""
@@ -187,11 +200,11 @@ def look(
     variants = [fitter.variants(model, i) for i in range(len(model.terms))]
     beside = np.concatenate([np.zeros((0, fitter.block.size)), *variants])
 
-    def gains(some: Sequence[Candidate]) -> list[float]:
-        return [each.gain for each in Screen(some, fitter, beside).beside(model)]
+    def explained(some: Sequence[Candidate]) -> Floats:
+        return Screen(some, fitter, beside).explained(model)
 
     taken = [*ent.names(model.entries), *without]
-    made = candidates(fitter, model, taken, ends=ends, known=known or (), gains=gains)
+    made = candidates(fitter, model, taken, ends=ends, known=known or (), explained=explained)
     cut = time.monotonic() > ends
     screen = Screen(made, fitter, beside)
     return Look(made, screen.beside(model), screen, None, cut)

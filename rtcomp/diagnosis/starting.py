@@ -30,7 +30,7 @@ def as_they_are(left: Callable[[Term], float], families: Sequence[Sequence[Term]
     """Return one term of each family: of those likeliest to first order that with which least is `left`.
 
     What is far from first order, as a reading that jumps further than friction yields, shows only as it is
-    which of its values is right.
+    which of its values is right; what first order makes too large, at half of it.
     """
 
     def tried(term: Term) -> float:
@@ -39,7 +39,7 @@ def as_they_are(left: Callable[[Term], float], families: Sequence[Sequence[Term]
         except (ConfigError, np.linalg.LinAlgError):
             return math.inf
 
-    some = [terms[:STARTS] for terms in families]
+    some = [[t for term in terms[:STARTS] for t in (term, *_halved(term))] for terms in families]
     errors = iter(shared(tried, [term for terms in some for term in terms]))
     return [
         min(zip([next(errors) for _ in terms], terms, strict=True), key=lambda one: one[0])[1]
@@ -114,16 +114,22 @@ def _begun(fitter: Stepped, model: Fitted) -> Callable[[Sequence[Term]], list[Te
     return begun
 
 
+def _halved(term: Term) -> list[Term]:
+    """Return a term at half its size, where that is not solved for anyway."""
+    return [] if ent.adds_force(ent.kind_of(term.entry)) else [_resized(term, 0.5)]
+
+
 def _sizes_of(term: Term) -> list[Term]:
     """Return a term at its own and at smaller and larger sizes."""
-    kind = ent.kind_of(term.entry)
-    found = [term]
-    for times in TIMES:
-        entry = dict(term.entry)
-        for p in kind.parameters:
-            if p.name in kind.linear and p.name in entry:
-                neutral = ent.neutral(kind, p.name)
-                value = neutral + times * (float(entry[p.name]) - neutral)
-                entry[p.name] = min(max(value, 0.9 * p.lowest), 0.9 * ent.highest(entry, p))
-        found.append(term.with_entry(entry))
-    return found
+    return [term, *(_resized(term, times) for times in TIMES)]
+
+
+def _resized(term: Term, times: float) -> Term:
+    """Return a term with so many times its size, within its bounds."""
+    kind, entry = ent.kind_of(term.entry), dict(term.entry)
+    for p in kind.parameters:
+        if p.name in kind.linear and p.name in entry:
+            neutral = ent.neutral(kind, p.name)
+            value = neutral + times * (float(entry[p.name]) - neutral)
+            entry[p.name] = min(max(value, 0.9 * p.lowest), 0.9 * ent.highest(entry, p))
+    return term.with_entry(entry)

@@ -20,14 +20,16 @@ from rtcomp.diagnosis.data import Data
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fit import STEPS, Fitter
 from rtcomp.diagnosis.fitted import Fitted, left_out
-from rtcomp.diagnosis.free import Free, Term, all_free_of
+from rtcomp.diagnosis.free import Free, Term, all_free_of, slopes
 from rtcomp.diagnosis.regression import Grams, Prior
 from rtcomp.diagnosis.replicate import replicate
 from rtcomp.diagnosis.result import PositionFit
+from rtcomp.diagnosis.settings import BELIEF_SD
 from rtcomp.diagnosis.windows import GROUPS, Windows
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect
+from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.stage.stage import Stage
 
 STEP = 5e-3
@@ -114,12 +116,30 @@ class Trajectory(Fitter):
         return np.asarray(drive - needed)
 
     def other_forms(self, model: Fitted, besides: str) -> Floats:
-        """Return no columns: what a force does to the position is not in proportion to it."""
+        """See `Fitter`: of friction; what an effect's force does to the position is not in proportion."""
+        return self.other_friction(model)
+
+    def other_friction(self, model: Fitted) -> Floats:
+        """See `Fitter`: each element of the believed friction stiffer by what a belief is off."""
+        stage = self.stage(model)
+        friction = stage.friction
+        elements = friction.elements if isinstance(friction, MaxwellSlip) else []
+        listed = [{"stiffness": stiffness, "reach": reach} for stiffness, reach in elements]
+
+        def one(i: int) -> Floats:
+            stiffer = {**listed[i], "stiffness": listed[i]["stiffness"] * (1.0 + STEP)}
+            other = stage.with_changes(stage={"friction": [*listed[:i], stiffer, *listed[i + 1 :]]})
+            return (model.residual - self._bent(self.windows.off(other))) * (BELIEF_SD / STEP)
+
+        none = np.zeros((0, model.residual.size))
+        made = self._forms.of(model, lambda: shared(one, range(len(listed))))
+        return np.concatenate([none, np.reshape(made, (-1, model.residual.size))])
+
+    def forms_of(self, model: Fitted, at: int) -> Floats:
+        """Return no columns: see `other_forms`."""
         return np.zeros((0, model.residual.size))
 
-    def variants(self, model: Fitted, at: int) -> Floats:
-        """See `other_forms`."""
-        return np.zeros((0, model.residual.size))
+    variants = forms_of
 
     def relative(self, model: Fitted, *, seen: bool = False) -> float:
         """See `Fitter`: error over the way that forces moved the axis; it counts by noise anyway."""
@@ -283,21 +303,7 @@ class Trajectory(Fitter):
 
     def _slopes_of(self, c: Floats, terms: list[Term], free: Sequence[Free], rest: Floats) -> Floats:
         """Return what the model changes by with each free parameter, (q, n)."""
-
-        def one(f: Free) -> Floats:
-            for way in (f.step, -f.step):
-                trial = list(terms)
-                f.put(trial, f.get(terms) + way)
-                moved = f.get(trial) - f.get(terms)
-                if moved == 0.0:
-                    continue
-                try:
-                    return (rest - self.residual(c, trial)) / moved
-                except ConfigError:
-                    continue
-            return np.zeros_like(rest)
-
-        return np.array(shared(one, free)) if free else np.zeros((0, rest.size))
+        return slopes(terms, free, lambda trial: rest - self.residual(c, trial), rest.size)
 
     def _ended(self, c: Floats, terms: list[Term]) -> Fitted:
         rest = self.residual(c, terms)

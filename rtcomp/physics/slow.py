@@ -34,6 +34,19 @@ def friction_drift_linear(p: Floats, s: Floats, w: Floats) -> None:
 
 
 @effect_kernel
+def friction_drift_late(p: Floats, s: Floats, w: Floats) -> None:
+    """p: change (1), time constant (s)."""
+    w[REACH] *= max(1.0 + p[0] * min(w[TIME] / p[1], 1.0) ** 3, LEAST)
+
+
+@effect_kernel
+def friction_drift_back(p: Floats, s: Floats, w: Floats) -> None:
+    """p: change (1), time constant (s)."""
+    part = min(w[TIME] / p[1], 1.0)
+    w[REACH] *= max(1.0 + 4.0 * p[0] * part * (1.0 - part), LEAST)
+
+
+@effect_kernel
 def stiction_ageing(p: Floats, s: Floats, w: Floats) -> None:
     """p: growth, distance (m), onset (s), stiffening, following; s: age (s) of contacts, place (m) in grain.
 
@@ -65,8 +78,9 @@ def creep(p: Floats, s: Floats, w: Floats) -> None:
 class FrictionDrift(Effect):
     """Level drifts with time or temperature; not viscous friction.
 
-    In the form `force` the whole force drifts. In `level` and `linear` contacts yield later or earlier at
-    equal stiffness: in `level` exponentially, in `linear` along a line that ends at the time constant.
+    In the form `force` the whole force drifts. In the others contacts yield later or earlier at equal
+    stiffness: in `level` exponentially; in `linear` along a line, in `late` with the third power, in `back`
+    there and back along a parabola, which end at the time constant.
     """
 
     name = "friction-drift"
@@ -76,13 +90,18 @@ class FrictionDrift(Effect):
         Parameter("time_constant", "s", 0.0, 1e7, "with which it comes, from the start", open_low=True),
     )
     kernel = friction_drift
-    forms = {"force": friction_drift, "level": friction_drift_level, "linear": friction_drift_linear}
+    forms = {
+        "force": friction_drift, "level": friction_drift_level, "linear": friction_drift_linear,
+        "late": friction_drift_late, "back": friction_drift_back,
+    }  # fmt: skip
     says = "friction grows or falls while the stage runs in or warms up"
-    equation = "F or yield <- (1 + change (1 - exp(-t / T))) times it, or yield (1 + change min(t / T, 1))"
+    equation = (
+        "F or yield <- (1 + change q) times it, q = 1 - exp(-t / T), t / T, (t / T)^3 or 4 t / T (1 - t / T)"
+    )
     source = "Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), run-in and temperature"
     signature = "residual force with the sign of motion whose size changes along the recording"
     experiment = "the same stroke at the beginning, in the middle and at the end of a long run"
-    example = {"change": 0.4, "time_constant": 1.5}
+    example = {"change": 0.4, "time_constant": 3.0}
     neutral = {"change": 0.0}
     linear = ("change",)
     order = 20

@@ -47,6 +47,7 @@ def test_an_effect_is_grown_in_the_form_that_it_has(following: float) -> None:
 def test_of_the_likeliest_starts_that_is_taken_which_leaves_least(errors: list[list[float]]) -> None:
     families = [[Term.of({"name": "drive-lag", "time_constant": e}) for e in family] for family in errors]
     found = as_they_are(lambda term: float(term.entry["time_constant"]), families, math.inf)
-    assert [t.entry["time_constant"] for t in found] == [min(family[:STARTS]) for family in errors]
+    # At half its size as well: first order makes some sizes too large.
+    assert [t.entry["time_constant"] for t in found] == [0.5 * min(family[:STARTS]) for family in errors]
     late = as_they_are(lambda term: float(term.entry["time_constant"]), families, -math.inf)
     assert late == [family[0] for family in families]

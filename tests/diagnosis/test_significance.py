@@ -38,8 +38,10 @@ def test_gains_are_those_of_refits_without_each_block() -> None:
     use[4] = False
     seen = use[block]
     c = np.linalg.lstsq(model[:, seen].T, y[seen], rcond=None)[0]
-    found = Screen(free, SimpleNamespace(block=block, blocks=blocks, use=use)).gains(model, y - c @ model)
-    for columns, screened in zip(spans, found, strict=True):
+    screen = Screen(free, SimpleNamespace(block=block, blocks=blocks, use=use))
+    found = screen.gains(model, y - c @ model)
+    explained = screen.explained(SimpleNamespace(free_columns=model, residual=y - c @ model))
+    for columns, screened, taken in zip(spans, found, explained.tolist(), strict=True):
         both = np.concatenate([model, columns])
         logs = []
         for k in np.flatnonzero(use):
@@ -52,6 +54,8 @@ def test_gains_are_those_of_refits_without_each_block() -> None:
         assert screened.gain == pytest.approx(np.mean(logs), abs=1e-4)
         whole = np.linalg.lstsq(both[:, seen].T, y[seen], rcond=None)[0]
         assert screened.sizes == pytest.approx(whole[3:], abs=1e-4)
+        left = [np.sum((y - fit @ table)[seen] ** 2) for fit, table in ((c, model), (whole, both))]
+        assert taken == pytest.approx(left[0] - left[1], rel=1e-4)
 
 
 def test_a_gain_like_those_of_replicates_is_chance_and_a_larger_one_is_not() -> None:

@@ -16,6 +16,7 @@ from rtcomp.diagnosis.baseline import baseline
 from rtcomp.diagnosis.belief import Belief
 from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.other_forms import in_any_form
 from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.replicate import replicate
 from rtcomp.diagnosis.sticking import MUCH, hides, part_untold, untold
@@ -43,6 +44,7 @@ BELIEF: dict[str, Any] = {
     "sensor": {"resolution": COUNT},
     "rate": RATE,
 }
+FINE = [{"stiffness": 1.1, "reach": 0.01}, {"stiffness": 0.4, "reach": 0.06}]
 LOAD = {"name": "load-dependent-friction", "coefficient": 0.25}
 
 
@@ -207,6 +209,30 @@ def test_damping_below_a_speed_comes_back_where_the_belief_has_another_speed() -
     fitter = Trajectory.of(balanced(off, data), off)
     mechanics = fitter.stage(fitter.fit([])).mechanics
     assert mechanics.micro_damping_speed == pytest.approx(0.3, rel=0.1)
+
+
+def test_a_spring_that_begins_with_the_wrong_law_finds_its_own() -> None:
+    spring = {"name": "parallel-spring", "stiffness": 0.2}
+    plant, level = stage().with_changes(stage={"effects": [spring]}), stage().with_changes(stage={"effects": []})
+    fitter = Trajectory.of(balanced(level, both(plant)), level)
+    model = fitter.fit([Term.of({**spring, "stiffness": 0.0, "cubic": 0.05})], fitter.fit([]))
+    assert model.entries[0]["stiffness"] == pytest.approx(0.2, rel=0.1)
+
+
+def test_friction_of_another_shape_than_believed_is_not_what_is_missing() -> None:
+    """Its elements are off one by one, as those of a belief are; a spring is no such thing."""
+    true = [{"stiffness": 1.3, "reach": 0.01}, {"stiffness": 0.3, "reach": 0.06}]
+    believed = stage(friction=FINE)
+    left = {}
+    for name, plant in (
+        ("shape", stage(friction=true)),
+        ("spring", stage({"name": "parallel-spring", "stiffness": 0.1}, friction=FINE)),
+    ):
+        fitter = Trajectory.of(balanced(believed, both(plant)), believed)
+        model = fitter.fit([])
+        other = in_any_form(fitter, model, fitter.other_friction(model))
+        left[name] = fitter.relative(other) / fitter.relative(model)
+    assert left["shape"] < 0.7 and left["spring"] > 0.9
 
 
 @pytest.mark.slow

@@ -69,13 +69,15 @@ def test_friction_drifts_as_a_whole_or_in_its_level() -> None:
     grown = 1.0 + 0.4 * -math.expm1(-0.5)
     for form, wire, still, expected in (
         ("force", SCALE, REACH, grown), ("level", REACH, SCALE, grown), ("linear", REACH, SCALE, 1.2),
+        ("late", REACH, SCALE, 1.05), ("back", REACH, SCALE, 1.4),
     ):  # fmt: skip
         entry = {**text, "form": form}
         assert one(wire, entry, time=1.0) == pytest.approx(expected)
         assert one(still, entry, time=1.0) == 1.0
-    assert one(REACH, {**text, "form": "linear"}, time=50.0) == pytest.approx(1.4)
-    for form in ("level", "linear"):
-        assert one(REACH, {**text, "form": form, "change": -1.0}, time=1e3) > 0.0
+    for form, end in (("linear", 1.4), ("late", 1.4), ("back", 1.0)):
+        assert one(REACH, {**text, "form": form}, time=50.0) == pytest.approx(end)
+    for form, time in (("level", 1e3), ("linear", 1e3), ("late", 1e3), ("back", 1.0)):
+        assert one(REACH, {**text, "form": form, "change": -1.0}, time=time) > 0.0
 
 
 def presliding() -> np.ndarray:
