@@ -213,7 +213,10 @@ def test_damping_below_a_speed_comes_back_where_the_belief_has_another_speed() -
 
 def test_a_spring_that_begins_with_the_wrong_law_finds_its_own() -> None:
     spring = {"name": "parallel-spring", "stiffness": 0.2}
-    plant, level = stage().with_changes(stage={"effects": [spring]}), stage().with_changes(stage={"effects": []})
+    plant, level = (
+        stage().with_changes(stage={"effects": [spring]}),
+        stage().with_changes(stage={"effects": []}),
+    )
     fitter = Trajectory.of(balanced(level, both(plant)), level)
     model = fitter.fit([Term.of({**spring, "stiffness": 0.0, "cubic": 0.05})], fitter.fit([]))
     assert model.entries[0]["stiffness"] == pytest.approx(0.2, rel=0.1)
