@@ -30,7 +30,8 @@ FINER = 3
 SMOOTHED = (1.0, 0.1, 0.01)
 """Parts of the noise's power for which the position is smoothed: each is tried."""
 EARLIER, CLOSE = 4.0, 1.4
-"""Times earlier than an axis seems to, that its friction may yield behind a play; ratio of units there."""
+"""Times earlier than an axis seems to, that its friction may yield behind a play; ratio of units there, and
+of the gaps that are looked through: a play shows within a fifth of its gap."""
 HARDLY = 0.02
 """Part of the friction level that the shortest units hold together, which are not counted for that."""
 SLIGHT = 1e-3

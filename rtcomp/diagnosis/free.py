@@ -21,7 +21,7 @@ LONGEST = 1.25
 SMALL = 0.05
 """Size of a parameter, over that of the drive's force or of 1, that is taken to be first order."""
 AT_BOUND = 1e-3
-"""Part of a number by which it may be away from its bound and still be at it."""
+"""Part of a number, or of a short range, by which it may be away from its bound and still be at it."""
 
 
 @dataclass(frozen=True)

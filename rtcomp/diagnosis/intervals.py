@@ -11,6 +11,7 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import BASE
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import ONCE, Fitted, left_out
+from rtcomp.diagnosis.free import AT_BOUND
 from rtcomp.diagnosis.regression import Grams
 from rtcomp.diagnosis.result import Retuned, Value
 from rtcomp.diagnosis.retuned import MOVED, Numbers, believed_friction
@@ -18,9 +19,6 @@ from rtcomp.diagnosis.spread import BALANCE, MODEL, elsewhere, scatter
 from rtcomp.kernels import Floats
 from rtcomp.stage.stage import Stage
 from rtcomp.units import for_axis
-
-AT_BOUND = 1e-3
-"""Part of its range within which a number is at its bound."""
 
 
 @dataclass(frozen=True)

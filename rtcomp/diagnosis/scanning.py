@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.baseline import CLOSE
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.excerpt import excerpt, with_few_units
@@ -20,8 +21,8 @@ from rtcomp.diagnosis.settings import LEAST_GAIN
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
-CLOSE, FASTER = 1.4, 1.8
-"""Ratios of lengths and of frequencies that are looked through: a play shows within a fifth of its gap."""
+FASTER = 1.8
+"""Ratio of frequencies that are looked through."""
 STIFFER = range(-1, 5)
 """Powers of it by which a load swings faster against the ends of its play than the axis on its friction."""
 BEST, TRIES, FIRST = 2, 50, 0.3
