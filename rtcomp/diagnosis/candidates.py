@@ -22,6 +22,7 @@ from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term, first_order
 from rtcomp.diagnosis.scales import Scales
+from rtcomp.diagnosis.starting import within
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Parameter, catalogue
@@ -278,13 +279,12 @@ def started(candidate: Candidate, sizes: Floats) -> Term:
     if len(candidate.parts) == 2:
         name = next(n for n in moved if n not in phases)
         step = float(candidate.parts[0][name])
-        most = 0.9 * ent.parameter(kind, name).high
-        out[name] = min(float(np.hypot(*sizes)) * step, most)
+        out[name] = within(ent.parameter(kind, name), float(np.hypot(*sizes)) * step, entry)
         out[phases[0]] = float(np.arctan2(sizes[1], sizes[0]))
     else:
         name = next(iter(moved))
         p = ent.parameter(kind, name)
         neutral = float(entry[name])
         value = neutral + float(sizes[0]) * (float(candidate.parts[0][name]) - neutral)
-        out[name] = min(max(value, 0.9 * p.lowest), 0.9 * ent.highest(entry, p))
+        out[name] = within(p, value, entry)
     return candidate.term.with_entry(out)

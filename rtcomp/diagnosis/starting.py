@@ -11,10 +11,12 @@ import numpy as np
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
+from rtcomp.physics import Parameter
 
 TIMES = (0.1, 0.3, 3.0, 10.0)
 """Times the size that first order has, at which an effect is tried too."""
@@ -22,6 +24,8 @@ POINTS = 10
 """Values of its nonlinear parameters, the likeliest first, from which an effect is tried."""
 FEW = 3
 """Steps after which starts are compared."""
+FULL = 0.9
+"""Part of its bound to which a size is cut that first order makes larger."""
 STARTS = 2
 """Likeliest values of an effect of which the better ones, as they are, are fitted."""
 
@@ -114,9 +118,15 @@ def _begun(fitter: Stepped, model: Fitted) -> Callable[[Sequence[Term]], list[Te
     return begun
 
 
+def within(p: Parameter, value: float, entry: Entry) -> float:
+    """Return a size (of the parameter `p`) within its bounds in the form of an entry, and not at them."""
+    return min(max(value, FULL * p.lowest), FULL * ent.highest(entry, p))
+
+
 def _halved(term: Term) -> list[Term]:
-    """Return a term at half its size, where that is not solved for anyway."""
-    return [] if ent.adds_force(ent.kind_of(term.entry)) else [_resized(term, 0.5)]
+    """Return a term at half its size, where that was cut."""
+    solved = ent.adds_force(ent.kind_of(term.entry))
+    return [_resized(term, 0.5)] if not solved and term == _resized(term, 1.0 / FULL) else []
 
 
 def _sizes_of(term: Term) -> list[Term]:
@@ -131,5 +141,5 @@ def _resized(term: Term, times: float) -> Term:
         if p.name in kind.linear and p.name in entry:
             neutral = ent.neutral(kind, p.name)
             value = neutral + times * (float(entry[p.name]) - neutral)
-            entry[p.name] = min(max(value, 0.9 * p.lowest), 0.9 * ent.highest(entry, p))
+            entry[p.name] = within(p, value, entry)
     return term.with_entry(entry)

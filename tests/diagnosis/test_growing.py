@@ -18,7 +18,7 @@ from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.growing import grow
 from rtcomp.diagnosis.pipeline import least_left
 from rtcomp.diagnosis.selection import look
-from rtcomp.diagnosis.starting import STARTS, as_they_are
+from rtcomp.diagnosis.starting import FULL, STARTS, as_they_are
 
 STRIBECK = {"name": "stribeck", "rise": 0.4, "velocity": 1.5e-3}
 
@@ -47,7 +47,13 @@ def test_an_effect_is_grown_in_the_form_that_it_has(following: float) -> None:
 def test_of_the_likeliest_starts_that_is_taken_which_leaves_least(errors: list[list[float]]) -> None:
     families = [[Term.of({"name": "drive-lag", "time_constant": e}) for e in family] for family in errors]
     found = as_they_are(lambda term: float(term.entry["time_constant"]), families, math.inf)
-    # At half its size as well: first order makes some sizes too large.
-    assert [t.entry["time_constant"] for t in found] == [0.5 * min(family[:STARTS]) for family in errors]
+    assert [t.entry["time_constant"] for t in found] == [min(family[:STARTS]) for family in errors]
     late = as_they_are(lambda term: float(term.entry["time_constant"]), families, -math.inf)
     assert late == [family[0] for family in families]
+
+
+def test_a_size_that_first_order_makes_larger_than_it_may_be_is_tried_at_half() -> None:
+    drift = Term.of({"name": "friction-drift", "change": -FULL, "time_constant": 9.0})
+    for true, taken in ((-0.5, -0.5 * FULL), (-0.8, -FULL)):
+        (found,) = as_they_are(lambda t, true=true: abs(float(t.entry["change"]) - true), [[drift]], math.inf)
+        assert found.entry["change"] == pytest.approx(taken)
