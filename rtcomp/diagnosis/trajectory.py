@@ -21,6 +21,7 @@ from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fit import STEPS, Fitter
 from rtcomp.diagnosis.fitted import Fitted, left_out
 from rtcomp.diagnosis.free import Free, Term, all_free_of, slopes
+from rtcomp.diagnosis.other_forms import overtones
 from rtcomp.diagnosis.regression import Grams, Prior
 from rtcomp.diagnosis.replicate import replicate
 from rtcomp.diagnosis.result import PositionFit
@@ -139,7 +140,10 @@ class Trajectory(Fitter):
         """Return no columns: see `other_forms`."""
         return np.zeros((0, model.residual.size))
 
-    variants = forms_of
+    def variants(self, model: Fitted, at: int) -> Floats:
+        """See `Fitter`: the overtones of a wave, to first order."""
+        made = self._forms.of((model, at), lambda: [overtones(self, model, model.entries[at])])
+        return np.asarray(made[0])
 
     def relative(self, model: Fitted, *, seen: bool = False) -> float:
         """See `Fitter`: error over the way that forces moved the axis; it counts by noise anyway."""

@@ -43,7 +43,7 @@ def test_an_effect_is_grown_in_the_form_that_it_has(following: float) -> None:
     assert least_left(fitter, [other], math.inf) == pytest.approx(own, abs=0.3)
 
 
-@given(st.lists(st.lists(st.floats(0.0, 9.0), min_size=1, max_size=4), max_size=6))
+@given(st.lists(st.lists(st.floats(1e-3, 9.0), min_size=1, max_size=4), max_size=6))
 def test_of_the_likeliest_starts_that_is_taken_which_leaves_least(errors: list[list[float]]) -> None:
     families = [[Term.of({"name": "drive-lag", "time_constant": e}) for e in family] for family in errors]
     found = as_they_are(lambda term: float(term.entry["time_constant"]), families, math.inf)

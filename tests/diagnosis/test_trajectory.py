@@ -238,6 +238,15 @@ def test_friction_of_another_shape_than_believed_is_not_what_is_missing() -> Non
     assert left["shape"] < 0.7 and left["spring"] > 0.9
 
 
+def test_overtones_of_a_wave_are_the_same_wave() -> None:
+    wave = {"name": "cogging", "amplitude": 0.1, "period": 0.6, "phase": 0.4}
+    plant = stage({**wave, "harmonics": [{"order": 2.0, "amplitude": 0.03, "phase": 1.0}]})
+    fitter = Trajectory.of(balanced(stage(), both(plant)), stage())
+    model = fitter.fit([Term.of(wave)], fitter.fit([]))
+    in_any = in_any_form(fitter, model, fitter.variants(model, 0))
+    assert fitter.relative(in_any) < 0.7 * fitter.relative(model)
+
+
 @pytest.mark.slow
 def test_a_band_without_force_that_friction_takes_up_is_named() -> None:
     done = diagnose(stage(), both(stage({"name": "drive-deadband", "width": 40.0})), budget=200.0)
