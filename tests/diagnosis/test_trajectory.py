@@ -240,11 +240,11 @@ def test_friction_of_another_shape_than_believed_is_not_what_is_missing() -> Non
 
 def test_overtones_of_a_wave_are_the_same_wave() -> None:
     wave = {"name": "cogging", "amplitude": 0.1, "period": 0.6, "phase": 0.4}
-    plant = stage({**wave, "harmonics": [{"order": 2.0, "amplitude": 0.03, "phase": 1.0}]})
+    plant = stage({**wave, "harmonics": [{"order": 2.0, "amplitude": 0.02, "phase": 1.0}]})
     fitter = Trajectory.of(balanced(stage(), both(plant)), stage())
     model = fitter.fit([Term.of(wave)], fitter.fit([]))
     in_any = in_any_form(fitter, model, fitter.variants(model, 0))
-    assert fitter.relative(in_any) < 0.7 * fitter.relative(model)
+    assert fitter.relative(in_any) < 0.75 * fitter.relative(model)
 
 
 @pytest.mark.slow
