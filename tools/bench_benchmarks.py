@@ -21,6 +21,7 @@ import numpy as np
 from figures_table import Figure, show
 
 from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.baseline import baseline
 from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.result import Diagnosis
@@ -164,6 +165,7 @@ def bouc_wen(folder: Path, budget: float) -> list[Figure]:
 def left_in_full(stage: Stage, data: Recording) -> float:
     """Return the relative force error on the reserved parts over the whole band of the force balance."""
     balance = ForceBalance(stage, load_data([data]))
+    baseline(balance)
     drive, needed = balance.both_sides(stage)
     rows = balance.reserved[balance.block]
     return float((np.mean((drive - needed)[rows] ** 2) / np.mean(drive[rows] ** 2)) ** 0.5)
