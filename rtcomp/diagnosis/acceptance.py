@@ -93,21 +93,19 @@ class Doubt:
     why: str
     """Empty where it is one."""
     left: float
-    """Part that is left of the force that there is without it, squared and above the noise."""
+    """Part that is left of what there is without it, squared and above the noise."""
 
 
 def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
     """Return why each effect of a model is no finding.
 
     Its size may be nothing, a number of it is at a physical bound, or more is left beside it than noise and a
-    part of what there is without it: what else makes the rest may make that part as well. What replicates of
-    the model leave too is not counted as left. Or it does not show in the other objective.
+    part of what there is without it: what else makes the rest may make that part as well. The part is the
+    geometric mean of that of the force and of that as the objective weighs it. What replicates of the model
+    leave too is not counted as left. Or it does not show in the other objective.
     """
     said = []
-    louder = fitter.louder(chosen)
     more = null is not None and null.p_of_error(chosen.errors) < LEVEL
-    noise = null.noise if null is not None else 0.0
-    beyond = max(1.0 - noise / max(float(chosen.errors.sum()), 1e-300), 0.0)
     for i, span in enumerate(told(fitter, chosen)):
         why = "its size may be nothing" if span.nothing else ""
         why = f"{', '.join(span.bound)} at its bound" if span.bound else why
@@ -115,8 +113,9 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
         if not why:
             without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
             rest = in_any_form(fitter, chosen, _only_forms(fitter, chosen, i))
-            left, there = (fitter.above_noise(model, louder) ** 2 for model in (rest, without))
-            left *= beyond / max(there, 1e-300)
+            left = math.sqrt(
+                _of_the_force(fitter, rest, without, null) * _as_weighed(fitter, rest, without, null)
+            )
             why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""
             if not why and denied(fitter, chosen, without):
                 why = NOT_SHOWN.format("simulated positions" if fitter.by_force else "forces")
@@ -132,3 +131,18 @@ def _only_forms(fitter: Fitter, chosen: Fitted, at: int) -> Floats:
     """
     forms = [fitter.forms_of(chosen, j) for j in range(len(chosen.terms)) if j != at]
     return np.concatenate([fitter.variants(chosen, at), fitter.other_friction(chosen), *forms])
+
+
+def _of_the_force(fitter: Fitter, rest: Fitted, without: Fitted, null: Null | None) -> float:
+    """Return the part of the force that is left of what there is `without` an effect, squared."""
+    noise, louder = null.noise if null is not None else 0.0, fitter.louder(rest)
+    left, there = (fitter.above_noise(model, louder) ** 2 for model in (rest, without))
+    beyond = max(1.0 - noise / max(float(rest.errors.sum()), 1e-300), 0.0)
+    return left * beyond / max(there, 1e-300)
+
+
+def _as_weighed(fitter: Fitter, rest: Fitted, without: Fitted, null: Null | None) -> float:
+    """Return the part of the squared residual that is left of what there is `without` an effect."""
+    noise = null.noise if null is not None else 0.0
+    left, there = (float(np.sum(model.residual[fitter.rows] ** 2)) - noise for model in (rest, without))
+    return max(left, 0.0) / max(there, 1e-300)
