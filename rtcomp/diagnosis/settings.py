@@ -40,8 +40,8 @@ ALIAS = 0.03
 LEFT = 0.05
 """Part of what there is without an effect (squared, above the noise) that may be left beside it, where that
 is more than noise: with more it is the nearest, not the right one; with less true ones of another form than
-the catalogue's go unnamed. In seven trials (400 cases) right names beside an unexplained rest left up to 0.041 of
-the force, but for two pairs that left 0.12 and 0.16; four wrong ones left 0.03 to 0.15."""
+the catalogue's go unnamed. In seven trials (400 cases) right names beside an unexplained rest left up to
+0.041 of the force, but for two pairs that left 0.12 and 0.16; four wrong ones left 0.03 to 0.15."""
 
 TOLERANCE = 0.01
 """Relative force error up to which a model agrees with a recording, whatever the sensor's noise."""
