@@ -12,7 +12,7 @@ from rtcomp.diagnosis.candidates import started
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.growing import NEAR, fitted_in_time
+from rtcomp.diagnosis.growing import fitted_in_time
 from rtcomp.diagnosis.other_forms import in_any_form
 from rtcomp.diagnosis.replicates import best
 from rtcomp.diagnosis.screening import look
@@ -25,6 +25,8 @@ SET_LEVEL = 0.05
 """Level of the confidence set."""
 CELLS = 10
 """Parts of a block over which models are compared: each with many rows, together many."""
+NEAR = 0.5
+"""Part of the best screened gain from which on a candidate is fitted in another's place."""
 DIGITS = 3
 """Digits of a probability that a thousand draws tell: below them models are equally likely."""
 

@@ -18,9 +18,6 @@ from rtcomp.diagnosis.screening import Screened
 from rtcomp.diagnosis.settings import FULL_FITS
 from rtcomp.errors import ConfigError
 
-NEAR = 0.5
-"""Part of the best screened gain from which on a candidate is a rival of the best."""
-
 
 def grow(
     fitter: Fitter, model: Fitted, made: Sequence[Candidate], screened: Sequence[Screened], ends: float
@@ -33,8 +30,7 @@ def grow(
     # First order is no guide to what is behind a play: its own motion is followed from place to place.
     behind = {c.name: c.term for c in made if fitter.by_force and ent.kind_of(c.term.entry).behind}
     terms = [t for t in terms if t.entry["name"] not in behind]
-    least = NEAR * max((s.gain for s in screened), default=0.0)
-    terms += [one for term in behind.values() for one in scanned(fitter, model, term, ends, least)]
+    terms += [one for term in behind.values() for one in scanned(fitter, model, term, ends)]
     found = fitted_in_time(fitter, model, terms, ends)
     return [*found, *fitted_in_time(fitter, model, in_better_form(fitter, found, ends), ends)]
 

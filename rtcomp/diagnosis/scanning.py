@@ -33,13 +33,13 @@ NEAR = 5
 """Lengths around that at which the term as stated is looked at."""
 
 
-def scanned(fitter: Fitter, model: Fitted, term: Term, ends: float, least_gain: float = 0.0) -> list[Term]:
+def scanned(fitter: Fitter, model: Fitted, term: Term, ends: float) -> list[Term]:
     """Return the term with all its numbers where a model with it fits best, and with its length alone.
 
     How a load meets the ends of its play decides which length fits: lengths and frequencies are looked
     through together, on a part of the balance. From the best the least is looked for by simplex (Nelder and
     Mead 1965, Computer Journal 7(4)): what leaves when the load is met a little earlier has no useful slope.
-    None where the model fits best without, or where no place has `least_gain` (logarithm of squared error).
+    None where the model fits best without.
     """
     some = excerpt(fitter, model)
     length = next(p.name for p in ent.free_parameters(term.entry, linear=False) if p.unit == "m")
@@ -53,8 +53,7 @@ def scanned(fitter: Fitter, model: Fitted, term: Term, ends: float, least_gain: 
     grids = [[swings * FASTER**k for k in STIFFER] if p.unit == "Hz" else [p.default] for p in stated]
     points = list(itertools.product(*grids, _lengths(fitter)))
     tried = shared(lambda point: from_afar({**defaults, **dict(zip(names, point, strict=True))}), points)
-    most = min((1.0 - LEAST_GAIN) ** 2, math.exp(-least_gain)) * few.quick(model.terms)
-    if not min(tried) < most:
+    if not min(tried) < (1.0 - LEAST_GAIN) ** 2 * few.quick(model.terms):
         return []  # nor near any of them, or too little to matter
     begun = [points[i] for i in np.argsort(tried, kind="stable")[:BEST]]
 
