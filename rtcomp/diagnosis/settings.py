@@ -40,8 +40,9 @@ ALIAS = 0.03
 LEFT = 0.05
 """Part of what there is without an effect (squared, above the noise) that may be left beside it, where that
 is more than noise: with more it is the nearest, not the right one; with less true ones of another form than
-the catalogue's go unnamed. In seven trials (400 cases) right names beside an unexplained rest left up to
-0.041 of the force, but for two pairs that left 0.12 and 0.16; four wrong ones left 0.03 to 0.15."""
+the catalogue's go unnamed. Settled on the names beside an unexplained rest in seven trials of about 400
+cases: of the force, right ones left up to 0.041, two right pairs 0.12 and 0.16, four wrong ones 0.03 to 0.15.
+No value parts them, for a name has no rival outside the catalogue."""
 
 TOLERANCE = 0.01
 """Relative force error up to which a model agrees with a recording, whatever the sensor's noise."""

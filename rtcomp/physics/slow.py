@@ -96,7 +96,7 @@ class FrictionDrift(Effect):
     }  # fmt: skip
     says = "friction grows or falls while the stage runs in or warms up"
     equation = (
-        "F or yield <- (1 + change q) times it, q = 1 - exp(-t / T), t / T, (t / T)^3 or 4 t / T (1 - t / T)"
+        "F or yield <- (1 + change q) times it, q = 1 - exp(-t / T), s, s^3 or 4 s (1 - s), s = min(t / T, 1)"
     )
     source = "Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), run-in and temperature"
     signature = "residual force with the sign of motion whose size changes along the recording"
