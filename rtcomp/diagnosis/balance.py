@@ -16,25 +16,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.blocks import reserved_blocks
+from rtcomp.diagnosis.blocks import cut
 from rtcomp.diagnosis.cache import KEPT_ONCE, Cache, Group, key_of
-from rtcomp.diagnosis.data import Data, Segment, reversals
+from rtcomp.diagnosis.data import Data, Segment
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.noise import Noise, Whitening
 from rtcomp.diagnosis.reaches import MOST_OWN, joined
-from rtcomp.diagnosis.settings import BLOCK_REVERSALS, BLOCK_SECONDS
 from rtcomp.diagnosis.signals import BASE, Signals
 from rtcomp.diagnosis.spectrum import filtered, spectrum
+from rtcomp.diagnosis.sticking import trust
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place
 from rtcomp.stage.balance import around_rows, forces, parts_of_drive
 from rtcomp.stage.stage import Stage
-
-LEAST_FORCE = 0.01
-"""Part of the drive's force (rms) that blocks must have to judge by."""
-FEWEST, MOST = 10, 25
-"""Blocks of a recording: at least, at most."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +52,9 @@ class ForceBalance(Signals):
         """N^2: mean square of what the sensor's noise makes of the residual below the motion's bandwidth."""
         self.block: np.ndarray = np.zeros(0, dtype=np.int64)
         self._reserved: np.ndarray = np.zeros(0, dtype=np.bool_)
+        self._trust = np.ones(1)
+        self.level = np.inf
+        """N, of which friction may do any part unseen where the axis seems to rest; where unknown, any."""
 
     def whiten(self, coefficients: Floats) -> None:
         """Weigh frequencies by what the sensor's noise does to the residual of a fit (base columns)."""
@@ -71,7 +69,16 @@ class ForceBalance(Signals):
         below = [filtered(s, self.data.rate, self.noise.wiener) for s in shaken]
         self.noise_power = float(np.mean(np.concatenate(below) ** 2))
         self._cache = Cache()
-        self._cut_blocks()
+        held = float(np.sum(coefficients[self.friction] * self.reaches))
+        believed = float(np.sum(self.weights * self.reaches))
+        self.level = max(held, believed) if self.stage.friction is not None or held > 0.0 else np.inf
+        self._weigh()
+        self.block, self._reserved = cut(self)
+        self.blocks = self._reserved.size
+
+    def _weigh(self) -> None:
+        self._trust = np.ones(1)
+        self._trust = trust(self)
 
     def put(self, reaches: Floats, step: float) -> None:
         """Put the grid of yield displacements (m) to `reaches`, in steps of `step` (logarithm)."""
@@ -92,8 +99,10 @@ class ForceBalance(Signals):
         if block is not None:
             other.blocks, other.block = int(block[-1]) + 1, block
             other._reserved = np.zeros(other.blocks, dtype=np.bool_)
-        other.believed_speed = self.believed_speed
+        other.believed_speed, other.level = self.believed_speed, self.level
         other._cache = Cache(KEPT_ONCE)
+        if self._whitening is not None:
+            other._weigh()
         return other
 
     @property
@@ -110,33 +119,6 @@ class ForceBalance(Signals):
         for effect, size in zip(made, c[self.size :], strict=True):
             force += size * self.force_of(effect, segment, path)
         return np.asarray(force)
-
-    def _cut_blocks(self) -> None:
-        assert self._whitening is not None
-        kept = [s.time[self._whitening.rows(s)].size for s in self.data.segments]
-        turns = sum(reversals(s.position) for s in self.data.segments)
-        count = min(self.data.seconds / BLOCK_SECONDS, turns / BLOCK_REVERSALS if turns else np.inf)
-        self.blocks = int(np.clip(count, FEWEST, MOST))
-        self.block = np.arange(sum(kept)) * self.blocks // sum(kept)
-        time = self.plain([s.time for s in self.data.segments])
-        stepped = {int(self.block[np.argmin(np.abs(time - j.time))]) for j in self.data.jumps}
-        self._reserved = reserved_blocks(self.blocks, stepped, self._still(), self._furthest())
-
-    def _still(self) -> set[int]:
-        """Return the blocks in which the drive's force hardly varies: they judge nothing."""
-        force = self.drive_force()
-        least = LEAST_FORCE * float(np.std(force))
-        return {k for k in range(self.blocks) if float(np.std(force[self.block == k])) < least}
-
-    def _furthest(self) -> set[int]:
-        """Return the blocks in which command, position and speed are lowest and highest."""
-        signals = [
-            [s.voltage for s in self.data.segments],
-            [s.position for s in self.data.segments],
-            [p.v for p in self.paths()],
-        ]
-        rows = [at(self.plain(s)) for s in signals for at in (np.argmin, np.argmax)]
-        return {int(self.block[row]) for row in rows}
 
     @property
     def whitening(self) -> Whitening:
@@ -200,13 +182,13 @@ class ForceBalance(Signals):
             at += sizes.size
             pending = signals if pending is None else [p + q for p, q in zip(pending, signals, strict=True)]
         if pending is not None:
-            out -= self._filtered(pending)[0]
+            out -= self.compared(pending)[0]
         return np.asarray(self._scale(y, by_load) * out)
 
     def forces_of(self, entries: Sequence[Entry]) -> Floats:
         """Return the columns (p, n) of the last of `entries`, which adds a force; they are not kept."""
         drive, _, added, by_load = self._groups(entries, None)
-        rows = np.concatenate([self._filtered(g.make()) for g in added[-1]])
+        rows = np.concatenate([self.compared(g.make()) for g in added[-1]])
         return np.asarray(self._scale(self._whitened(drive)[0], by_load) * rows)
 
     def _scale(self, y: Floats, by_load: Group | None) -> float:
@@ -269,17 +251,19 @@ class ForceBalance(Signals):
 
     def _swing(self, y: Floats) -> float:
         """Return the power of what a constant does not change."""
-        return float(np.var(y[~self.reserved[self.block]]))
+        rows = ~self.reserved[self.block]
+        swung, weight = y[rows], np.broadcast_to(self._trust, y.shape)[rows]
+        return float(np.mean((swung - (weight @ swung) / (weight @ weight) * weight) ** 2))
 
     # -- rows, whitened and joined over the segments ------------------------------------------------------
 
     def _whitened(self, group: Group) -> Floats:
         """Return a group's columns (p, n), filtered, thinned and joined."""
-        found: Floats = self._cache.of(group.key, lambda: [self._filtered(group.make())])[0]
+        found: Floats = self._cache.of(group.key, lambda: [self.compared(group.make())])[0]
         return found
 
-    def _filtered(self, made: list[Floats]) -> Floats:
-        """Return signals (K, p) or (K,), one array a segment, filtered, thinned and joined: (p, n)."""
+    def compared(self, made: list[Floats]) -> Floats:
+        """Return signals (K, p) or (K,), one array a segment, filtered, thinned, weighed, joined: (p, n)."""
         parts = []
         for segment, signals in zip(self.data.segments, made, strict=True):
             table = np.ascontiguousarray(np.atleast_2d(signals.T))
@@ -290,7 +274,12 @@ class ForceBalance(Signals):
             wanted = slice(rows.start - kept.start, rows.stop - kept.start, rows.step)
             response = self._whitening.response
             parts.append(filtered(table[:, kept], self.data.rate, response, noisy=True, wanted=wanted))
-        return np.concatenate(parts, axis=1)
+        return np.asarray(self._trust * np.concatenate(parts, axis=1))
+
+    @property
+    def trust(self) -> Floats:
+        """Weight of each compared row, (n,): below 1 where motion does not tell what friction does."""
+        return self._trust
 
     def both_sides(self, stage: Stage) -> tuple[Floats, Floats]:
         """Return the force of the drive and the force that the motion needs (N, (n,)) by any `stage`.

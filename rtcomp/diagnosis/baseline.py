@@ -12,7 +12,7 @@ from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.replicate import replicate
+from rtcomp.diagnosis.replicate import left_by
 from rtcomp.diagnosis.settings import LEAST_GAIN
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
@@ -130,7 +130,7 @@ def _smooth(fitter: Fitter, terms: Sequence[Term]) -> None:
         stage = fitter.stage(model, between=True)
     except ConfigError:
         return
-    data = replicate(stage, balance.data, [p.x for p in balance.paths()], balance.read_noise(stage), 0)
+    data = left_by(stage, balance)
     if data is None:
         return
     others = [fitter.on(data) for _ in SMOOTHED]

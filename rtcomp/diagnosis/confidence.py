@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 
@@ -13,11 +14,12 @@ from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.growing import fitted_in_time
-from rtcomp.diagnosis.other_forms import in_any_form
+from rtcomp.diagnosis.intervals import told
+from rtcomp.diagnosis.other_forms import errors_beside, in_any_form, of_position
 from rtcomp.diagnosis.replicates import best
 from rtcomp.diagnosis.screening import look
 from rtcomp.diagnosis.selection import Search
-from rtcomp.diagnosis.settings import ALIAS
+from rtcomp.diagnosis.settings import ALIAS, LEVEL
 from rtcomp.diagnosis.significance import confidence_set, log_gain, probabilities
 from rtcomp.kernels import Floats
 
@@ -71,6 +73,8 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         plainest = min(models[k].size for k in members)
         enough = max(weight[k] for k in members if models[k].size == plainest)
         members = {k for k in members if models[k].size == plainest or weight[k] > enough} | {0}
+        if _may_be_no_wave(fitter, found, i):
+            members |= {k for k, m in enumerate(models) if k and _gain_by_position(fitter, rest, m) >= least}
         order = sorted(members, key=lambda k: (-round(float(weight[k]), DIGITS), k))  # of equals the chosen
         names = [_replaced(models[k], chosen, i) for k in order]
         kept = [j for j, n in enumerate(names) if n not in names[:j]]
@@ -99,6 +103,26 @@ def _by_cell(fitter: Fitter, model: Fitted, at: int) -> Floats:
     used = fitter.use[block]
     found = np.bincount(cell[used], model.residual[used] ** 2, fitter.blocks * CELLS)
     return np.asarray(found[np.bincount(cell[used], minlength=found.size) > 0] + 1e-300)
+
+
+def _may_be_no_wave(fitter: Fitter, found: Search, at: int) -> bool:
+    """Tell whether a chosen wave over the stroke may be another function of the position.
+
+    The interval of its period holds the stroke; or it does not repeat within that, and leaves more than
+    noise: neither its repeating nor its form shows it.
+    """
+    low, high = fitter.balance.data.stroke
+    period = told(fitter, found.chosen)[at].values.get(ent.PERIOD)
+    if period is None or not fitter.by_force:
+        return False
+    more = found.null is not None and found.null.p_of_error(found.chosen.errors) < LEVEL
+    return period.high >= high - low or (more and 2.0 * period.value > high - low)
+
+
+def _gain_by_position(fitter: Fitter, rest: Fitted, model: Fitted) -> float:
+    """Return the gain of a model's last effect in any form; none where it is no function of the position."""
+    forms = of_position(fitter.balance, model.entries[-1])
+    return log_gain(rest.errors, errors_beside(fitter, model, forms)) if forms.size else -math.inf
 
 
 def _independent(fitter: Fitter, model: Fitted) -> float:

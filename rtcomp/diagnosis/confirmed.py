@@ -13,7 +13,7 @@ import numpy as np
 
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
-from rtcomp.diagnosis.replicate import replicate
+from rtcomp.diagnosis.replicate import left_by
 from rtcomp.diagnosis.significance import SURE
 from rtcomp.diagnosis.windows import GROUPS, Windows
 from rtcomp.kernels import Floats
@@ -37,8 +37,7 @@ def denied(fitter: Fitter, model: Fitted, without: Fitted) -> bool:
     if there(*(errors(fitter, m, windows) for m in (model, without))):
         return False
     stage = fitter.stage(model, between=True)
-    motion = [path.x for path in balance.paths()]
-    data = replicate(stage, balance.data, motion, balance.read_noise(stage), 0)
+    data = left_by(stage, balance)
     if data is None:
         return False
     other = fitter.on(data)

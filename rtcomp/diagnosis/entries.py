@@ -187,7 +187,7 @@ def composed(entry: Mapping[str, Any], sizes: Floats) -> Entry:
     for name, quarters in _sized(entry):
         if quarters:
             sine, cosine = float(sizes[at]), float(sizes[at + 1])
-            out[name] = math.hypot(sine, cosine)
+            out[name] = min(math.hypot(sine, cosine), highest(entry, parameter(kind_of(entry), name)))
             out.update(dict.fromkeys(_phases(entry), math.atan2(cosine, sine)))
         else:
             out[name] = float(sizes[at])

@@ -134,9 +134,12 @@ class Fitter:
         return variants(self, model, at)
 
     def relative(self, model: Fitted, *, seen: bool = False) -> float:
-        """Return what a model leaves over what there is, rms, not reserved; `seen`: above the noise."""
+        """Return what a model leaves over what there is, rms, not reserved; `seen`: above the noise.
+
+        Rows count as far as motion tells what friction does there.
+        """
         b, both = self.balance, (self.force(model), self.balance.drive_force())
-        left, given = ((as_seen(b, f) if seen else f)[self.rows] for f in both)
+        left, given = ((b.trust * (as_seen(b, f) if seen else f))[self.rows] for f in both)
         return math.sqrt(np.mean(left**2) / max(np.mean(given**2), 1e-300))
 
     def left_by(self, stage: Stage) -> Floats:
@@ -158,7 +161,8 @@ class Fitter:
 
     def above_noise(self, model: Fitted, louder: float = 1.0) -> float:
         """Return that relative error (rms) above that of noise, so many times `louder`."""
-        power = float(np.mean(self.balance.drive_force() ** 2))
+        weight = self.balance.trust**2
+        power = float(np.sum(weight * self.balance.drive_force() ** 2) / np.sum(weight))
         noise = louder**2 * self.balance.noise_power / max(power, 1e-300)
         return float(np.sqrt(max(self.relative(model) ** 2 - noise, 0.0)))
 

@@ -25,7 +25,7 @@ from rtcomp.diagnosis.result import Diagnosis, Place
 from rtcomp.diagnosis.screening import Look, look
 from rtcomp.diagnosis.selection import LOOKED, Search, search, until
 from rtcomp.diagnosis.settings import BUDGET, LEAST_GAIN, LEFT
-from rtcomp.diagnosis.sticking import hides, part_untold, sticks
+from rtcomp.diagnosis.sticking import hides, untold
 from rtcomp.diagnosis.trajectory import Trajectory
 from rtcomp.diagnosis.validation import Reserved
 from rtcomp.diagnosis.where import Compared, as_force
@@ -35,7 +35,7 @@ from rtcomp.stage.stage import Stage
 
 Progress = Callable[[float, str], None]
 STICKS = (
-    "the axis sticks finer than a count of its sensor, which leaves {:.2g} % of the force open to friction: "
+    "the axis sticks finer than its sensor sees, which leaves {:.2g} % of the force open to friction: "
     "judged by position, simulated over {:.2g} s from points of the recording"
 )
 SEARCH, TELL_APART = 0.75, 0.9
@@ -91,16 +91,10 @@ def _diagnosed(
         left = (base.sse / max(balance.power, 1e-300)) ** 0.5
         located(left, locate(view, before, None, seed, stage.axis))
     say(1.0, "balance")
-    untold, noise = part_untold(stage, recordings), _noise(balance)
-    searched = ends - (1.0 - SEARCH) * budget
-    by_force = objectives[0]
-    judges = [] if hides(untold, noise, by_force.fitter.relative(base)) else ["force"]
-    judges += ["position"] if sticks(untold, noise) else []
-    for i, judge in enumerate(judges):
-        ways = objectives if judge == "force" else [_by_trajectory(stage, by_force)]
-        fitter, found = _searched(ways, until(searched, 1.0 / (len(judges) - i)), say, seed)
-        if found.chosen.terms or not Rest.of(fitter, found).significant:
-            break  # else, what forces do not explain, positions may
+    ways = objectives
+    if hides(objectives[0].fitter, base):
+        ways = [_by_trajectory(stage, objectives[0])]
+    fitter, found = _searched(ways, ends - (1.0 - SEARCH) * budget, say, seed)
     say(0.0, "tell apart")
     sets = alternatives(fitter, found, ends - (1.0 - TELL_APART) * budget)
     say(0.5, "judge")
@@ -109,15 +103,10 @@ def _diagnosed(
     done = answer(stage, fitter, found, sets, reserved, seed, late=time.monotonic() > ends)
     say(1.0, "judge")
     notes = [BAND_LIMITED] if len(ways) > 1 and not fitter.balance.data.held else []
-    notes += [STICKS.format(100.0 * untold, done.position.seconds)] if done.position is not None else []
+    if done.position is not None:
+        notes.append(STICKS.format(100.0 * untold(balance), done.position.seconds))
     notes += [f"not tried within {budget:g} s: {what}" for what in found.not_tried]
     return replace(done, notes=[*notes, *done.notes], not_tried=found.not_tried)
-
-
-def _noise(balance: ForceBalance) -> float:
-    """Return the part of the drive's force (rms) that noise alone leaves."""
-    rows = ~balance.reserved[balance.block]
-    return float(np.sqrt(balance.noise_power / np.mean(balance.drive_force()[rows] ** 2)))
 
 
 def _by_trajectory(stage: Stage, by_force: Objective) -> Objective:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from rtcomp.physics.program import COUNT, Program, run_chain
 from rtcomp.stage.shoot import WIDER
 from rtcomp.stage.simulate import integrate, largest_step, largest_stiffness
 from rtcomp.stage.stage import Stage
+
+if TYPE_CHECKING:
+    from rtcomp.diagnosis.signals import Signals
 
 BANDWIDTH = 1.0 / 30.0
 """Bandwidth of the feedback of a stage without controller, relative to the recording's rate."""
@@ -54,6 +58,12 @@ def replicate(stage: Stage, data: Data, motion: list[Floats], noise: float, seed
         new = new if segment is means else averaged(new, data.averaged)
         made.append(replace(new, before=None, run_in=means.run_in))
     return replace(data, segments=tuple(made))
+
+
+def left_by(stage: Stage, signals: Signals, seed: int = 0) -> Data | None:
+    """Return the recordings that `stage` would have left along the motion of `signals`."""
+    motion = [path.x for path in signals.paths()]
+    return replicate(stage, signals.data, motion, signals.read_noise(stage), seed)
 
 
 def followed(stage: Stage, path: Floats, rate: float) -> tuple[Floats, Floats]:

@@ -15,7 +15,7 @@ from rtcomp.diagnosis.candidates import Candidate, candidates, started
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
-from rtcomp.diagnosis.replicate import replicate
+from rtcomp.diagnosis.replicate import left_by
 from rtcomp.diagnosis.screening import Screen, Screened
 from rtcomp.diagnosis.settings import LEVEL, REPLICATES
 from rtcomp.diagnosis.significance import Null, log_gain
@@ -49,18 +49,15 @@ def null_of(
     motion is judged by surrogates of its residual instead. The largest gains are those of full fits, the
     others in proportion; after the time `ends` (time.monotonic) all are those of first order.
     """
-    balance = fitter.balance
     try:
         stage = fitter.stage(fitted, between=True)
     except ConfigError:
         return _surrogates(fitter, fitted, screen, seed)
-    motion = [p.x for p in balance.paths()]
-    noise = balance.read_noise(stage)
     names = ent.names(fitted.entries)
     events = any(ent.happens_once(ent.kind_of(c.term.entry)) for c in screen.candidates)
 
     def one(number: int) -> Drawn | None:
-        data = replicate(stage, balance.data, motion, noise, 1000 * seed + number)
+        data = left_by(stage, fitter.balance, 1000 * seed + number)
         if data is None:
             return None
         other = fitter.on(data)

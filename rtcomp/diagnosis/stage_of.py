@@ -11,6 +11,7 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import BASE, ForceBalance
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitted import Fitted
+from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import catalogue
 from rtcomp.stage.stage import Stage
@@ -58,7 +59,10 @@ def stage_of(balance: ForceBalance, fitted: Fitted, *, between: bool = False) ->
     mechanics["effects"] = effects
     if not effects:
         del mechanics["effects"]
-    return Stage.from_dict(data)
+    try:
+        return Stage.from_dict(data)
+    except ValueError as error:
+        raise ConfigError(f"a fit ran away: it has numbers that no stage may have ({error})") from error
 
 
 def with_forces(stage: Stage, factor: float) -> Stage:

@@ -1,68 +1,105 @@
-"""Force of friction that no motion tells: the axis sticks finer than its sensor sees."""
+"""Force of friction that no motion tells: what each row of a force balance counts, and when it is no judge.
+
+Where the reading stays on a count of the sensor, friction goes along with the drive's force unseen. What it
+may have done there adds to the residual beside the sensor's noise. Noise that is finer than that is smoothed,
+and what it does to friction is part of that of the residual.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rtcomp.diagnosis.replicate import left_by
+from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats, compiled
-from rtcomp.physics.maxwell_slip import MaxwellSlip
-from rtcomp.recording.reader import Recording
-from rtcomp.stage.stage import Stage
 
+if TYPE_CHECKING:
+    from rtcomp.diagnosis.balance import ForceBalance
+    from rtcomp.diagnosis.fit import Fitter
+    from rtcomp.diagnosis.fitted import Fitted
+
+DRAWS = 16
+"""Draws of what friction did unseen: their mean square is its power."""
+COUNTS = 1.5
+"""How far a reading may go about at rest, in counts of the sensor."""
 MUCH = 0.03
-"""Part of the drive's force (rms). Where noise makes more of a balance of forces, and friction that no motion
-tells may make more too, the balance is no judge."""
+"""Part of the drive's force (rms). Where friction may make more of it unseen, and the balance leaves more of
+it open on a replicate of its own fit, it is no judge. Of 29 geared joints with a 12-bit encoder it left 0.005
+to 0.031, and named what was there; of two pendulums whose friction yields within a count 0.036 and 0.045, of
+a measured servo 0.38, and named what was not."""
 
 
-def untold(stage: Stage, reading: Floats, voltage: Floats) -> Floats:
-    """Return how far apart the forces (N) lie, (K,), that a row's reading leaves open to friction.
+def trust(balance: ForceBalance) -> Floats:
+    """Return the weight of each compared row, (n,): 1 where motion tells what friction does.
 
-    In a stretch in which the reading stays within one and a half counts of the sensor, what friction did left
-    no trace: it went along with the drive's force, over as much as that went up and down, or over all that
-    friction can do.
+    Else residuals there have the variance of noise, 1, and that of what friction may have done besides:
+    weighted least squares. It followed the drive's force, up or down, by as much as that went up and down in
+    a stretch of rest, or by all that friction can do.
     """
-    friction = stage.friction
-    level = friction.level if isinstance(friction, MaxwellSlip) else 0.0
-    count = max(stage.sensor.resolution, 4.0 * stage.sensor.noise)  # m
-    out = np.zeros(reading.size)
-    if count > 0.0 and level > 0.0:
-        force = _force(stage, voltage)
-        _widths(np.ascontiguousarray(reading), force, 1.5 * count, 2.0 * level, out)
-    return out
+    random = np.random.default_rng(7)
+    unseen = [
+        random.choice((-1.0, 1.0), (int(stretch[-1]) + 1, DRAWS))[stretch] * course[:, None]
+        for course, stretch in _unseen(balance)
+    ]
+    return np.asarray(1.0 / np.sqrt(1.0 + np.mean(balance.compared(unseen) ** 2, axis=0)))
 
 
-def part_untold(stage: Stage, recordings: Sequence[Recording]) -> float:
-    """Return the part of the drive's force that is open so, rms over rms: evenly spread within its width."""
-    open_to = sum(float(np.sum(untold(stage, r.position, r.voltage) ** 2)) / 12.0 for r in recordings)
-    given = sum(float(np.sum(_force(stage, r.voltage) ** 2)) for r in recordings)
-    return float(np.sqrt(open_to / max(given, 1e-300)))
+def untold(balance: ForceBalance) -> float:
+    """Return the part of the drive's force (rms) that friction may have made unseen."""
+    unseen = np.concatenate([course for course, _ in _unseen(balance)])
+    given = np.concatenate([drive_of(balance, s.voltage) for s in balance.data.segments])
+    return float(np.sqrt(np.sum(unseen**2) / max(float(np.sum(given**2)), 1e-300)))
 
 
-def _force(stage: Stage, voltage: Floats) -> Floats:
-    return stage.force_constant * np.clip(voltage, -stage.voltage_limit, stage.voltage_limit)
+def hides(fitter: Fitter, model: Fitted) -> bool:
+    """Tell whether friction hides so much that a balance of forces, here of a `model`, is no judge.
 
-
-def sticks(untold: float, noise: float) -> bool:
-    """Tell whether friction that no motion tells, and noise, each make much of a balance of forces.
-
-    Both are parts of the drive's force (rms).
+    It would be one if it told how a replicate of that model came about.
     """
-    return min(untold, noise) > MUCH
+    balance = fitter.balance
+    if untold(balance) <= MUCH:
+        return False
+    try:
+        stage = fitter.stage(model, between=True)
+    except ConfigError:
+        return True
+    data = left_by(stage, balance)
+    if data is None:
+        return True
+    other = fitter.on(data)
+    return other.relative(other.fit(model.terms, model)) > MUCH
 
 
-def hides(untold: float, noise: float, left: float) -> bool:
-    """Tell whether an axis `sticks`, and this may make half of what a balance of forces has `left`.
+def drive_of(balance: ForceBalance, voltage: Floats) -> Floats:
+    """Return the force (N) of the believed drive at a voltage (V)."""
+    stage = balance.stage
+    return np.asarray(stage.force_constant * np.clip(voltage, -stage.voltage_limit, stage.voltage_limit))
 
-    Where more is left, the balance sees what is missing.
+
+def _unseen(balance: ForceBalance) -> list[tuple[Floats, np.ndarray]]:
+    """Return `courses` of each segment, as far as friction is known to go."""
+    width, read = COUNTS * balance.stage.sensor.resolution, balance.data.segments
+    return [courses(s.position, drive_of(balance, s.voltage), width, balance.level) for s in read]
+
+
+def courses(x: Floats, force: Floats, width: float, most: float) -> tuple[Floats, np.ndarray]:
+    """Return what friction may have done unseen in each row (N, (K,)), and its stretch of rest, (K,).
+
+    In a stretch the position `x` (m, (K,)) stays within `width` (m). There friction went along with the
+    `force` (N, (K,)), from the middle of what that did at most as far as `most` (N).
     """
-    return sticks(untold, noise) and untold**2 + noise**2 > 0.5 * left**2
+    course, stretch = np.zeros(force.size), np.zeros(force.size, np.int64)
+    _courses(np.ascontiguousarray(x), force, width, most, course, stretch)
+    return course, stretch
 
 
 @compiled
-def _widths(x: Floats, force: Floats, width: float, most: float, out: Floats) -> None:
-    first = 0
+def _courses(
+    x: Floats, force: Floats, width: float, most: float, course: Floats, stretch: np.ndarray
+) -> None:
+    first, number = 0, 0
     while first < x.size:
         low = high = x[first]
         least = largest = force[first]
@@ -71,5 +108,8 @@ def _widths(x: Floats, force: Floats, width: float, most: float, out: Floats) ->
             low, high = min(low, x[last]), max(high, x[last])
             least, largest = min(least, force[last]), max(largest, force[last])
             last += 1
-        out[first:last] = min(largest - least, most)
-        first = last
+        middle = 0.5 * (least + largest)
+        for k in range(first, last):
+            course[k] = min(max(force[k] - middle, -most), most)
+            stretch[k] = number
+        first, number = last, number + 1

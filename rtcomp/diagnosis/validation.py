@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rtcomp.diagnosis.balance import LEAST_FORCE, ForceBalance
+from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.blocks import LEAST_FORCE
 from rtcomp.diagnosis.where import as_seen, noise_seen
 from rtcomp.errors import RecordingError
 from rtcomp.stage.stage import Stage

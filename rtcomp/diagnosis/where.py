@@ -66,12 +66,12 @@ class Compared:
 
 def as_force(balance: ForceBalance, residual: Floats) -> Floats:
     """Return a whitened residual (n,) as a force (N): its spectrum coloured again."""
-    return _weighed(balance, residual, balance.whitening.coloured)
+    return _weighed(balance, residual / balance.trust, balance.whitening.coloured)
 
 
 def as_white(balance: ForceBalance, force: Floats) -> Floats:
     """Return a force (N, (n,)) on the compared rows as a whitened residual: the inverse of `as_force`."""
-    return _weighed(balance, force, balance.whitening.white)
+    return balance.trust * _weighed(balance, force, balance.whitening.white)
 
 
 def as_seen(balance: ForceBalance, force: Floats) -> Floats:

@@ -53,6 +53,19 @@ def test_nothing_is_named_where_nothing_is_missing() -> None:
 
 
 @pytest.mark.slow
+def test_a_spring_of_another_law_is_not_only_a_wave_that_was_not_seen_to_repeat() -> None:
+    """With the square of the position: the command that moves the axis alike against it."""
+    axis, recording = recorded(None, effects=[{"name": "parallel-spring", "stiffness": 3000.0}])
+    x = recording.position
+    force = 2.0 * x * np.abs(x) / np.max(x**2)
+    pushed = {**recording.columns, "voltage": recording.voltage + force / axis.force_constant}
+    believed = axis.with_changes(stage={"effects": [{"name": "parallel-spring", "stiffness": 3000.0}]})
+    done = diagnose(believed, [Recording(pushed, recording.rate_hz)], budget=300.0)
+    assert done.verdict == "missing-physics"
+    assert all("parallel-spring" in effect.names for effect in done.effects)
+
+
+@pytest.mark.slow
 def test_other_values_of_what_is_believed_are_retuned_not_named() -> None:
     done = diagnosed(None, mass=2.15, viscous=8.6)
     assert done.verdict in ("retuned", "consistent")

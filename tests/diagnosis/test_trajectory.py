@@ -15,11 +15,12 @@ from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import baseline
 from rtcomp.diagnosis.belief import Belief
 from rtcomp.diagnosis.data import load_data
+from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.other_forms import in_any_form
 from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.replicate import replicate
-from rtcomp.diagnosis.sticking import MUCH, hides, part_untold, untold
+from rtcomp.diagnosis.sticking import MUCH, courses, hides, untold
 from rtcomp.diagnosis.trajectory import Trajectory
 from rtcomp.diagnosis.windows import GROUPS, Windows
 from rtcomp.errors import ConfigError
@@ -44,6 +45,7 @@ BELIEF: dict[str, Any] = {
     "sensor": {"resolution": COUNT},
     "rate": RATE,
 }
+STIFF = [{"stiffness": 80.0, "reach": 1.0e-3}]
 FINE = [{"stiffness": 1.1, "reach": 0.01}, {"stiffness": 0.4, "reach": 0.06}]
 LOAD = {"name": "load-dependent-friction", "coefficient": 0.25}
 
@@ -90,33 +92,63 @@ def test_force_that_a_count_hides_is_told_from_rest_and_from_motion() -> None:
     axis = stage()
     rows = np.arange(600)
     position = np.where(rows < 300, 0.2, 0.2 + (rows - 300) * 5e-3) + COUNT * 0.4 * (rows % 2)
-    changing = 20.0 + 10.0 * np.sin(rows / 20.0)
-    found = untold(axis, position, changing)
-    assert found[:300] == pytest.approx(20.0 * axis.force_constant, rel=1e-2)
-    assert found[305:].max() < 0.05 * found[0]
-    assert not untold(axis, position, np.full(600, 20.0)).any()
-    assert untold(axis, position, 20.0 * changing).max() == pytest.approx(2.0 * axis.friction.level)  # type: ignore[union-attr]
-    exact = Stage.from_dict({**axis.to_dict(), "sensor": {}})
-    assert not untold(exact, position, changing).any()
+    force = axis.force_constant * (20.0 + 10.0 * np.sin(rows / 20.0))
+    course, stretch = courses(position, force, 1.5 * COUNT, np.inf)
+    assert np.all(stretch[:300] == 0) and np.all(np.diff(stretch) >= 0)
+    assert course[:300] == pytest.approx(force[:300] - force[:300].mean(), abs=0.1 * np.ptp(force))
+    assert np.abs(course[305:]).max() < 0.05 * np.abs(course[:300]).max()
+    assert not courses(position, np.ones(600), 1.5 * COUNT, np.inf)[0].any()
 
 
-def test_presliding_that_the_sensor_resolves_is_not_hidden() -> None:
-    plant = stage(friction=[{"stiffness": 1.0, "reach": 0.04}])
-    sees = Stage.from_dict({**plant.to_dict(), "sensor": {"resolution": 1e-6}})
-    assert part_untold(sees, [recorded(sees)]) < 0.02 < MUCH < part_untold(stage(), [recorded(stage(LOAD))])
+@given(st.floats(0.0, 2.0), st.floats(0.0, 1e-2))
+def test_friction_does_unseen_no_more_than_it_can(most: float, width: float) -> None:
+    rows = np.arange(300)
+    force, position = np.sin(rows / 9.0), 0.02 * np.sin(rows / 30.0)
+    course, _ = courses(position, force, width, most)
+    assert np.abs(course).max() <= most
+    assert width > 0.0 or not course.any()
 
 
-@given(
-    st.floats(1.1 * MUCH, 1.0), st.floats(1.1 * MUCH, 1.0), st.floats(0.0, 3.0), st.floats(0.0, 0.9 * MUCH)
-)
-def test_what_a_balance_sees_beyond_noise_and_rest_it_judges(
-    rest: float, noise: float, left: float, little: float
-) -> None:
-    """The larger what is left, the less of it can be hidden; without noise or rest nothing is."""
-    assert hides(rest, noise, min(rest, noise))
-    assert not hides(rest, noise, 1.5 * (rest + noise))
-    assert hides(rest, noise, 0.5 * left) or not hides(rest, noise, left)
-    assert not hides(little, noise, left) and not hides(rest, little, left)
+def test_rows_of_rest_count_less_and_those_of_motion_whole() -> None:
+    """The command goes on while the reading does not."""
+    plant = stage(friction=STIFF)
+    run = recorded(plant)
+    rests = np.arange(run.position.size) % 600 < 200
+    held = np.where(rests, run.position[np.arange(rests.size) // 600 * 600], run.position)
+    balance = balanced(plant, [replace(run, columns={**run.columns, "position": held})])
+    at_rest = balance.plain([rests.astype(np.float64)]) > 0.0
+    assert np.all((balance.trust > 0.0) & (balance.trust <= 1.0))
+    assert np.median(balance.trust[at_rest]) < 0.5 * np.median(balance.trust[~at_rest])
+    exact = Stage.from_dict({**plant.to_dict(), "sensor": {}})
+    assert np.all(balanced(exact, [recorded(exact)]).trust == 1.0)
+
+
+def test_friction_has_the_more_to_hide_in_the_coarser_the_sensor() -> None:
+    parts = []
+    for count in (3e-2, COUNT, 1e-6):
+        axis = Stage.from_dict({**stage(friction=STIFF).to_dict(), "sensor": {"resolution": count}})
+        balance = balanced(axis, both(axis))
+        parts.append(untold(balance))
+    assert parts[0] > parts[1] > MUCH > parts[2]
+    assert not hides(Fitter(balance), Fitter(balance).fit([]))
+
+
+def test_a_balance_that_does_not_know_its_own_replicate_again_is_no_judge() -> None:
+    """Friction that yields within a count, and as much of it that yields over some of them."""
+    wide = [{"stiffness": 0.01 / (k * COUNT), "reach": k * COUNT} for k in range(1, 9)]
+    found = []
+    for friction in (STIFF, wide):
+        axis = stage(friction=friction)
+        balance = balanced(axis, both(axis))
+        assert untold(balance) > MUCH
+        found.append(hides(Fitter(balance), Fitter(balance).fit([])))
+    assert found == [True, False]
+
+
+def test_friction_that_is_little_beside_a_spring_hides_nothing() -> None:
+    spring = {"name": "parallel-spring", "stiffness": 2.0}
+    sprung = stage(spring, friction=[{"stiffness": 1.0, "reach": 1.0e-3}])
+    assert untold(balanced(sprung, [recorded(sprung)])) < 0.1 * MUCH
 
 
 def test_a_way_run_at_a_steady_speed_is_no_work_of_forces(loaded: list[Recording]) -> None:
@@ -138,12 +170,6 @@ def test_an_effect_beyond_its_bounds_is_told_as_such(entry: dict[str, Any]) -> N
     assert belief.moved(still, []).mass == pytest.approx(stage().mass)
     with pytest.raises(ConfigError, match=entry["name"]):
         belief.moved(still, [entry])
-
-
-def test_friction_that_is_little_beside_a_spring_hides_nothing() -> None:
-    spring = {"name": "parallel-spring", "stiffness": 2.0}
-    sprung = stage(spring, friction=[{"stiffness": 1.0, "reach": 1.0e-3}])
-    assert part_untold(sprung, [recorded(sprung)]) < 0.1 * MUCH
 
 
 def test_no_block_is_without_windows() -> None:
@@ -280,7 +306,7 @@ def test_friction_that_grows_with_the_load_is_named(loaded: list[Recording]) -> 
 
 @pytest.mark.slow
 def test_a_pendulum_as_believed_is_left_in_peace() -> None:
-    plant = stage(friction=[{"stiffness": 80.0, "reach": 1.0e-3}])
+    plant = stage(friction=STIFF)
     done = diagnose(plant, both(plant), budget=300.0)
     assert done.position is not None
     assert done.verdict in ("consistent", "retuned") and not done.effects
