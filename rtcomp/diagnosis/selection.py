@@ -104,6 +104,7 @@ def search(
                 found.not_tried.append(_further(found.chosen))
             break
         grown, short = _grown(fitter, beam, judged, null.p_value(judged.gain) < LEVEL, ends)
+        grown += _in_other_forms(fitter, found, grown, ends)
         _skipped(found, short)
         fit = [g for g in grown if accepted(fitter, g, _parent(g, beam), null, everything)]
         good = _distinct(sorted(fit, key=score))[:BEAM]
@@ -153,6 +154,20 @@ def _grown(
         missing = [t for t in last if t.entry["name"] not in ent.names(other.entries)]
         grown += fitted_in_time(fitter, other, missing, ends)
     return grown, time.monotonic() > ends
+
+
+def _in_other_forms(fitter: Fitter, found: Search, grown: Sequence[Fitted], ends: float) -> list[Fitted]:
+    """Return the best model with its last effect beside other forms of those before it.
+
+    The form that suits them alone may be bent to do without the last.
+    """
+    if not grown:
+        return []
+    names = ent.names(found.chosen.entries)
+    alike = [m for m in found.alternatives if ent.names(m.entries) == names]
+    near = [m for m in alike if score(m) < score(found.chosen) + NEAR]
+    last = min(grown, key=score).terms[-1:]
+    return [model for other in near for model in fitted_in_time(fitter, other, last, ends)]
 
 
 def _beside(other: Fitted, seen: Look) -> tuple[list[Candidate], list[Screened]]:
