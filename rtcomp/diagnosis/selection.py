@@ -164,7 +164,7 @@ def _in_other_forms(fitter: Fitter, found: Search, grown: Sequence[Fitted], ends
     if not grown:
         return []
     names = ent.names(found.chosen.entries)
-    alike = [m for m in found.alternatives if ent.names(m.entries) == names]
+    alike = [m for m in found.alternatives if ent.names(m.entries) == names and not m.at_bound]
     near = [m for m in alike if score(m) < score(found.chosen) + NEAR]
     last = min(grown, key=score).terms[-1:]
     return [model for other in near for model in fitted_in_time(fitter, other, last, ends)]
