@@ -14,8 +14,9 @@ from rtcomp.diagnosis.confirmed import denied
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.free_function import rival
 from rtcomp.diagnosis.intervals import told
-from rtcomp.diagnosis.other_forms import errors_beside, in_any_form
+from rtcomp.diagnosis.other_forms import errors_beside, force_of, in_any_form
 from rtcomp.diagnosis.settings import LEAST_GAIN, LEFT, LEVEL, NEGLIGIBLE
 from rtcomp.diagnosis.significance import Null, log_gain
 from rtcomp.kernels import Floats
@@ -24,6 +25,7 @@ PLAINER = 1e-3
 """Logarithm of the error that one parameter more must gain to count at all."""
 TOO_MUCH = "{:.0f} % of what there is without it is left, more than noise"
 NOT_SHOWN = "it does not show in {}"
+STANDS_IN = "a force that goes by {} explains more, and more than noise is left"
 
 
 def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, everything: float) -> bool:
@@ -102,7 +104,8 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
     Its size may be nothing, a number of it is at a physical bound, or more is left beside it than noise and a
     part of what there is without it: what else makes the rest may make that part as well. The part is the
     geometric mean of that of the force and of that as the objective weighs it. What replicates of the model
-    leave too is not counted as left. Or it does not show in the other objective.
+    leave too is not counted as left. Or, where more than noise is left, a force that is any function of one
+    thing explains more. Or it does not show in the other objective.
     """
     said = []
     more = null is not None and null.p_of_error(chosen.errors) < LEVEL
@@ -112,11 +115,16 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
         left = 1.0
         if not why:
             without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
-            rest = in_any_form(fitter, chosen, _only_forms(fitter, chosen, i))
+            forms = _only_forms(fitter, chosen, i)
+            rest = in_any_form(fitter, chosen, forms)
             left = math.sqrt(
                 _of_the_force(fitter, rest, without, null) * _as_weighed(fitter, rest, without, null)
             )
             why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""
+            if not why and more and fitter.by_force:
+                size = float(np.std(force_of(fitter, chosen, i)))
+                other = rival(fitter, without, errors_beside(fitter, chosen, forms), size)
+                why = STANDS_IN.format(other) if other else ""
             if not why and denied(fitter, chosen, without):
                 why = NOT_SHOWN.format("simulated positions" if fitter.by_force else "forces")
         said.append(Doubt(why, left))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from rtcomp.diagnosis.baseline import baseline
 from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.free_function import rival
 from rtcomp.diagnosis.other_forms import errors_beside, overtones
 from rtcomp.diagnosis.screening import Screen, Screened, look
 from rtcomp.diagnosis.where import as_white
@@ -125,3 +127,19 @@ def test_other_forms_beside_a_model_do_not_make_it_a_poorer_one() -> None:
     assert np.all(errors_beside(fitter, fitted, some) == fitted.errors)
     some[0] = fitted.residual + 0.3 * np.std(fitted.residual) * random.standard_normal(fitted.residual.size)
     assert np.log(errors_beside(fitter, fitted, 100.0 * some[:1])).mean() < np.log(fitted.errors).mean() - 1.0
+
+
+def test_a_force_that_goes_by_one_thing_by_an_unknown_law_is_a_rival_of_a_name() -> None:
+    """A bump at one place takes a wave's name, beside which it leaves much; not so a wave."""
+    axis, wave = stage(), {"name": "cogging", "amplitude": 1.0, "period": 3e-4, "phase": 0.3}
+    recording = run(axis, there_and_back(20.0))
+    x, found = recording.position, []
+    for force in (np.exp(-(((x - 1.2e-4) / 4e-5) ** 2)), np.sin(2.0 * np.pi * x / 1.0e-4) ** 3):
+        pushed = {**recording.columns, "voltage": recording.voltage + force / axis.force_constant}
+        balance = ForceBalance(axis, load_data([replace(recording, columns=pushed)]))
+        base, fitter = baseline(balance), Fitter(balance)
+        period = 1.0e-4 if found else 3.0e-4
+        model = fitter.fit([Term.of({**wave, "period": period})], base)
+        errors = errors_beside(fitter, model, overtones(fitter, model, model.entries[0]))
+        found.append(rival(fitter, base, errors, 0.5))
+    assert found == ["position", ""]
