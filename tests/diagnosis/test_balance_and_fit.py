@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import weakref
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -218,6 +219,22 @@ def test_a_stage_of_a_fit_is_the_belief_where_nothing_is_missing() -> None:
     assert found.mass == pytest.approx(2.0, rel=0.02)
     drive, needed = balance.both_sides(found)
     assert np.sqrt(np.mean((drive - needed) ** 2) / np.mean(drive**2)) < 0.02
+
+
+def test_a_fit_that_ran_away_is_no_stage() -> None:
+    believed = stage()
+    balance = ForceBalance(believed, load_data([run(believed, there_and_back())]))
+    model = baseline(balance)
+    with pytest.raises(ConfigError, match="ran away"):
+        stage_of(balance, replace(model, coefficients=1e12 * model.coefficients))
+
+
+@given(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9))
+def test_a_wave_is_no_larger_than_it_may_be(sine: float, cosine: float) -> None:
+    weight = ent.composed({"name": "gravity", "amplitude": 1.0, "phase": 0.0}, np.array([sine, cosine]))
+    most = ent.parameter(ent.kind_of(weight), "amplitude").high
+    assert weight["amplitude"] == pytest.approx(min(np.hypot(sine, cosine), most))
+    assert ent.build(weight).name == "gravity"
 
 
 def test_friction_that_nobody_believes_is_found_to_the_noise() -> None:
