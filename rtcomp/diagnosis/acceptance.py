@@ -123,7 +123,8 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
             why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""
             if not why and more and fitter.by_force:
                 size = float(np.std(force_of(fitter, chosen, i)))
-                other = rival(fitter, without, errors_beside(fitter, chosen, forms), size)
+                errors = errors_beside(fitter, chosen, forms)
+                other = rival(fitter, without, errors, size, chosen.entries[i])
                 why = STANDS_IN.format(other) if other else ""
             if not why and denied(fitter, chosen, without):
                 why = NOT_SHOWN.format("simulated positions" if fitter.by_force else "forces")

@@ -12,10 +12,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.locate import axes_of
-from rtcomp.diagnosis.other_forms import errors_beside
+from rtcomp.diagnosis.other_forms import errors_beside, of_position
 from rtcomp.diagnosis.significance import log_gain
 from rtcomp.diagnosis.where import Compared, as_white
 from rtcomp.kernels import Floats
@@ -24,17 +25,19 @@ KNOTS = 16
 """Knots of a function at quantiles of what it goes by, joined by straight lines."""
 
 
-def rival(fitter: Fitter, without: Fitted, errors: Floats, size: float) -> str:
+def rival(fitter: Fitter, without: Fitted, errors: Floats, size: float, entry: Entry) -> str:
     """Return what a force goes by that explains more than an effect, "" where there is none.
 
-    It stands in the effect's place, beside the model `without` that. `errors` (B_use,) are those of the
-    effect in any form, `size` (N) its rms, which the function is believed to have too.
+    It stands in the place of the effect, an `entry`, beside the model `without` that. `errors` (B_use,) are
+    those of the effect in any form, `size` (N) its rms, which the function is believed to have too. A spring
+    by any law is a spring: of what is a smooth function of the position, another one is a form.
     """
     if not np.isfinite(size) or size == 0.0:
         return ""
     gains = {
         name: log_gain(errors, errors_beside(fitter, without, size * columns))
         for name, columns in _functions(fitter.balance)
+        if name != "position" or not of_position(fitter.balance, entry).size
     }
     best = max(gains, key=lambda name: gains[name])
     return best if gains[best] > 0.0 else ""

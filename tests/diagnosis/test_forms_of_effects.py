@@ -141,5 +141,5 @@ def test_a_force_that_goes_by_one_thing_by_an_unknown_law_is_a_rival_of_a_name()
         period = 1.0e-4 if found else 3.0e-4
         model = fitter.fit([Term.of({**wave, "period": period})], base)
         errors = errors_beside(fitter, model, overtones(fitter, model, model.entries[0]))
-        found.append(rival(fitter, base, errors, 0.5))
+        found.append(rival(fitter, base, errors, 0.5, model.entries[0]))
     assert found == ["position", ""]
