@@ -25,6 +25,7 @@ from rtcomp.diagnosis.selection import Search
 from rtcomp.diagnosis.settings import LEAST_GAIN, LEVEL, TOLERANCE
 from rtcomp.diagnosis.significance import log_gain
 from rtcomp.diagnosis.stage_of import with_forces
+from rtcomp.diagnosis.unbiased import unbiased
 from rtcomp.diagnosis.validation import Reserved
 from rtcomp.diagnosis.where import Compared, curves
 from rtcomp.errors import ConfigError, RtcompError
@@ -69,8 +70,8 @@ def answer(
     late: bool = False,
 ) -> Diagnosis:
     """Return the diagnosis that a search ends in; where it is `late`, without what takes long to tell."""
-    balance, base, chosen = fitter.balance, found.baseline, found.chosen
-    rest = Rest.of(fitter, found)
+    balance, rest = fitter.balance, Rest.of(fitter, found)
+    base, chosen = (_unbiased(fitter, found, model) for model in (found.baseline, found.chosen))
     spans = told(fitter, chosen)
     notes = _notes(balance, found)
     shares = _shares(base, chosen, sets)
@@ -92,7 +93,7 @@ def answer(
     where = (
         [] if verdict == "consistent" else locate(view, before, after if named else None, seed, believed.axis)
     )
-    beside = found.beside if final is found.chosen else None
+    beside = found.beside if final is chosen else None
     blind = found.cut or (late and beside is None)
     seen = [] if blind else sights(fitter, final, found.null, beside)
     names = {n for e in named for n in e.names}
@@ -115,6 +116,13 @@ def answer(
         fitter.position(believed, stages["retuned"], stages["after"], seed),
         stages["retuned"],
     )
+
+
+def _unbiased(fitter: Fitter, found: Search, model: Fitted) -> Fitted:
+    """Return a model without the bias of its fit, where replicates of it tell that."""
+    if found.null is None or found.null.numbers is None or model is not found.replicated:
+        return model
+    return unbiased(fitter, model, found.null.numbers)
 
 
 def _part(gain: float) -> float:

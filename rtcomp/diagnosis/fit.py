@@ -23,7 +23,7 @@ from rtcomp.diagnosis.cache import KEPT_ONCE, Cache
 from rtcomp.diagnosis.data import Data
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitted import Fitted, left_out
-from rtcomp.diagnosis.free import Free, Term, free_of, slopes
+from rtcomp.diagnosis.free import Free, Term, changed, free_of, slopes
 from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.other_forms import other_beliefs, other_forms, variants
 from rtcomp.diagnosis.regression import Grams, Prior
@@ -246,7 +246,7 @@ class Fitter:
         damping, tangents = 1e-3, None
         for _ in range(steps if free else 0):
             tangents = self._tangents(current, free, system, c, weights)
-            joint, wide = self._jointly(system, prior, tangents)
+            joint, wide = self.jointly(system, prior, tangents)
             power = np.diag(joint.gram[self.use].sum(axis=0))[c.size :]
             improved = False
             for _ in range(4):
@@ -254,10 +254,7 @@ class Fitter:
                 whole = joint.solve(self.use, Prior(wide.mean, held, wide.low, wide.high), variance)
                 if joint.errors(whole, self.use).sum() > (1.0 - SETTLED) * sse:
                     break  # no step is expected to gain anything
-                moved = whole[c.size :]
-                trial = self._sized(current, system, c)
-                for f, step in zip(free, moved.tolist(), strict=True):
-                    f.put(trial, f.get(current) + min(max(step, -f.most(current)), f.most(current)))
+                trial = changed(self._sized(current, system, c), free, whole[c.size :])
                 try:
                     found = self.solve(trial, weights, variance, c)
                 except ConfigError:
@@ -288,6 +285,19 @@ class Fitter:
         settled = not goes_by_whole(b, entries) or consistent(b, made_for, weights)
         return done if settled else self._as_it_is(done)
 
+    def moved_by(self, model: Fitted, change: Floats) -> Fitted:
+        """Return a model with coefficients and nonlinear parameters, (p + q,), others by `change`.
+
+        Friction keeps its shape: its level changes. Raises ConfigError where no stage has such numbers.
+        """
+        c, own, reaches = model.coefficients, self.balance.friction, self.balance.reaches
+        moved = np.clip(c + change[: c.size], model.prior.low, model.prior.high)
+        level, more = (float(each[own] @ reaches) for each in (c, change))
+        moved[own] = c[own] * (max(1.0 + more / level, 0.0) if level > 0.0 else 1.0)
+        terms = self._sized(changed(model.terms, model.free, change[c.size :]), model.system, moved)
+        rest = self.balance.error([t.entry for t in terms], moved, moved[own])
+        return replace(model, terms=tuple(terms), coefficients=moved, residual=rest, weights=moved[own])
+
     def _as_it_is(self, model: Fitted) -> Fitted:
         """Return a model with the error of its own friction, where its columns were made for another.
 
@@ -298,11 +308,10 @@ class Fitter:
         worse = max(sse / max(model.sse, 1e-300), 1.0)
         return replace(model, residual=true, sse=worse * model.sse, errors=worse * model.errors)
 
-    def _jointly(self, system: System, prior: Prior, tangents: Floats) -> tuple[Grams, Prior]:
-        """Return statistics and prior of all columns of a system and of tangents, (q, n), together."""
-        some = np.full(tangents.shape[0], np.inf)
-        columns = np.concatenate([system.columns, tangents])
-        return Grams.of(columns, system.y, self.block, self.blocks), prior.extended(-some, some)
+    def jointly(self, system: System, prior: Prior, more: Floats) -> tuple[Grams, Prior]:
+        """Return statistics and prior of the columns of a system and of `more`, (q, n), together."""
+        columns = np.concatenate([system.columns, more])
+        return Grams.of(columns, system.y, self.block, self.blocks), prior.extended(more.shape[0])
 
     def _finished(
         self,
@@ -316,7 +325,7 @@ class Fitter:
         variance: float,
         weights: Floats,
     ) -> Fitted:
-        joint, wide = self._jointly(system, prior, tangents)
+        joint, wide = self.jointly(system, prior, tangents)
         whole = np.concatenate([c, np.zeros(len(free))])
         errors, without = left_out(joint, self.use, wide, variance, whole)
         residual = system.y - c @ system.columns

@@ -122,6 +122,14 @@ def _free_of(terms: Sequence[Term], balance: ForceBalance, *, sizes: bool) -> li
     return found
 
 
+def changed(terms: Sequence[Term], free: Sequence[Free], change: Floats) -> list[Term]:
+    """Return terms with their free parameters others by `change`, (q,), as far as one step may go."""
+    moved = list(terms)
+    for f, step in zip(free, change.tolist(), strict=True):
+        f.put(moved, f.get(terms) + min(max(step, -f.most(terms)), f.most(terms)))
+    return moved
+
+
 def slopes(
     terms: list[Term], free: Sequence[Free], changed: Callable[[list[Term]], Floats], rows: int
 ) -> Floats:

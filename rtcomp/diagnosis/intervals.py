@@ -12,7 +12,6 @@ from rtcomp.diagnosis.balance import BASE
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import ONCE, Fitted, left_out
 from rtcomp.diagnosis.free import AT_BOUND
-from rtcomp.diagnosis.regression import Grams
 from rtcomp.diagnosis.result import Retuned, Value
 from rtcomp.diagnosis.retuned import MOVED, Numbers, believed_friction
 from rtcomp.diagnosis.spread import BALANCE, MODEL, elsewhere, scatter
@@ -91,11 +90,8 @@ def _shapes_held(fitter: Fitter, fitted: Fitted) -> Fitted:
 
 def _left_out(fitter: Fitter, fitted: Fitted, numbers: int = 0) -> Fitted:
     """Return the fit with its coefficients `without` each block computed again."""
-    joint = np.concatenate([fitted.system.columns, fitted.tangents])
-    grams = Grams.of(joint, fitted.system.y, fitter.block, fitter.blocks)
-    some = len(fitted.free)
-    wide = fitted.prior.extended(np.full(some, -np.inf), np.full(some, np.inf))
-    whole = np.concatenate([fitted.coefficients, np.zeros(some)])
+    grams, wide = fitter.jointly(fitted.system, fitted.prior, fitted.tangents)
+    whole = np.append(fitted.coefficients, np.zeros(len(fitted.free)))
     return replace(fitted, without=left_out(grams, fitter.use, wide, fitted.variance, whole, numbers)[1])
 
 

@@ -192,11 +192,10 @@ def _beside(fitter: Fitter, model: Fitted, forms: Floats) -> tuple[Floats, Grams
 
     A form is believed to differ by about the effect's own size.
     """
-    columns = np.concatenate([model.system.columns, model.tangents, forms])
-    joint = Grams.of(columns, model.system.y, fitter.block, fitter.blocks)
-    some = np.full(columns.shape[0] - model.prior.low.size, np.inf)
-    prior = model.prior.extended(-some, some)
+    more = np.concatenate([model.tangents, forms])
+    joint, prior = fitter.jointly(model.system, model.prior, more)
     prior.precision[-forms.shape[0] :] = 1.0
+    columns = np.concatenate([model.system.columns, more])
     return columns, joint, prior, joint.solve(fitter.use, prior, model.variance)
 
 

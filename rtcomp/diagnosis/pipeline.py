@@ -25,7 +25,7 @@ from rtcomp.diagnosis.result import Diagnosis, Place
 from rtcomp.diagnosis.screening import Look, look
 from rtcomp.diagnosis.selection import LOOKED, Search, search, until
 from rtcomp.diagnosis.settings import BUDGET, LEAST_GAIN, LEFT
-from rtcomp.diagnosis.sticking import hides, untold
+from rtcomp.diagnosis.sticking import MUCH, hides, untold
 from rtcomp.diagnosis.trajectory import Trajectory
 from rtcomp.diagnosis.validation import Reserved
 from rtcomp.diagnosis.where import Compared, as_force
@@ -40,6 +40,8 @@ STICKS = (
 )
 SEARCH, TELL_APART = 0.75, 0.9
 """Parts of the budget at which the search ends, and what then tells its models apart."""
+FORCES = 0.5
+"""Part of the time for the search after which positions may have to judge instead of forces."""
 BAND_LIMITED = "the command is taken as band-limited between rows, which fits better than held"
 Located = Callable[[float, Sequence[Place]], None]
 """Told, before anything is named, what part of the force the refitted stage leaves open (rms), and where."""
@@ -91,10 +93,11 @@ def _diagnosed(
         left = (base.sse / max(balance.power, 1e-300)) ** 0.5
         located(left, locate(view, before, None, seed, stage.axis))
     say(1.0, "balance")
-    ways = objectives
-    if hides(objectives[0].fitter, base):
-        ways = [_by_trajectory(stage, objectives[0])]
-    fitter, found = _searched(ways, ends - (1.0 - SEARCH) * budget, say, seed)
+    finish = ends - (1.0 - SEARCH) * budget
+    hidden = untold(balance) > MUCH
+    fitter, found = _searched(objectives, until(finish, FORCES) if hidden else finish, say, seed)
+    if hidden and Rest.of(fitter, found).significant and hides(fitter, found.chosen):
+        fitter, found = _by_trajectory(stage, fitter, finish, say, seed)
     say(0.0, "tell apart")
     sets = alternatives(fitter, found, ends - (1.0 - TELL_APART) * budget)
     say(0.5, "judge")
@@ -102,18 +105,20 @@ def _diagnosed(
         reserved = Reserved(fitter.balance)
     done = answer(stage, fitter, found, sets, reserved, seed, late=time.monotonic() > ends)
     say(1.0, "judge")
-    notes = [BAND_LIMITED] if len(ways) > 1 and not fitter.balance.data.held else []
+    notes = [BAND_LIMITED] if len(objectives) > 1 and not fitter.balance.data.held else []
     if done.position is not None:
         notes.append(STICKS.format(100.0 * untold(balance), done.position.seconds))
     notes += [f"not tried within {budget:g} s: {what}" for what in found.not_tried]
     return replace(done, notes=[*notes, *done.notes], not_tried=found.not_tried)
 
 
-def _by_trajectory(stage: Stage, by_force: Objective) -> Objective:
-    """Return the objective that judges by simulated position, on the same blocks."""
-    believed = stage if stage.friction is not None else by_force.fitter.stage(by_force.base)
+def _by_trajectory(
+    stage: Stage, by_force: Fitter, ends: float, say: Progress, seed: int
+) -> tuple[Fitter, Search]:
+    """Return the search on the objective that judges by simulated position, on the same blocks."""
+    believed = stage if stage.friction is not None else by_force.stage(by_force.fit([]))
     fitter = Trajectory.of(by_force.balance, believed)
-    return Objective(fitter, fitter.fit([]))
+    return fitter, search(fitter, fitter.fit([]), ends, say, seed)
 
 
 @dataclass(frozen=True)

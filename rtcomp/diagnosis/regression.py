@@ -24,16 +24,10 @@ class Prior:
     low: Floats
     high: Floats
 
-    def extended(self, low: Floats, high: Floats) -> Prior:
-        """Return the prior with further coefficients of which only bounds are known."""
-        none = np.zeros(low.size)
-        join = np.concatenate
-        return Prior(
-            join([self.mean, none]),
-            join([self.precision, none]),
-            join([self.low, low]),
-            join([self.high, high]),
-        )
+    def extended(self, count: int) -> Prior:
+        """Return the prior with so many further coefficients, of which nothing is known."""
+        own, more = (self.mean, self.precision, self.low, self.high), (0.0, 0.0, -np.inf, np.inf)
+        return Prior(*(np.append(one, np.full(count, each)) for one, each in zip(own, more, strict=True)))
 
 
 @dataclass(frozen=True)

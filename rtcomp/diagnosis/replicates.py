@@ -19,6 +19,7 @@ from rtcomp.diagnosis.replicate import left_by
 from rtcomp.diagnosis.screening import Screen, Screened
 from rtcomp.diagnosis.settings import LEVEL, REPLICATES
 from rtcomp.diagnosis.significance import Null, log_gain
+from rtcomp.diagnosis.unbiased import numbers_of
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
@@ -30,10 +31,13 @@ IN_FULL = 3
 
 @dataclass(frozen=True)
 class Drawn:
-    """A replicate: its largest gain to first order, what that is in a full fit, and its errors (B,)."""
+    """A replicate: its largest gain to first order, what that is in a full fit, its errors and numbers."""
 
     gain: float
     errors: Floats
+    """(B,)."""
+    numbers: Floats
+    """(p + q,)."""
     fit: Callable[[], float] | None = None
     """Makes the full fit; None once that is done, or will not be."""
     in_full: float | None = None
@@ -67,11 +71,13 @@ def null_of(
         made = candidates(other, again, names, events=True) if events else []
         if made:
             gains += zip(made, Screen(made, other, screen.variants).beside(again), strict=True)
-        errors = again.errors * fitter.power / max(other.power, 1e-300)
+        errors, numbers = again.errors * fitter.power / max(other.power, 1e-300), numbers_of(other, again)
         candidate, screened = max(gains, key=lambda each: each[1].gain, default=(None, None))
         if candidate is None or screened is None or screened.gain <= 0.0:
-            return Drawn(0.0, errors)
-        return Drawn(screened.gain, errors, lambda: gain_in_full(other, again, candidate, screened, ends))
+            return Drawn(0.0, errors, numbers)
+        return Drawn(
+            screened.gain, errors, numbers, lambda: gain_in_full(other, again, candidate, screened, ends)
+        )
 
     found: list[Drawn] = []
     chance = np.zeros(0)
@@ -102,7 +108,8 @@ def _null(fitted: Fitted, found: Sequence[Drawn], chance: Floats) -> Null:
     more = float(np.median(told)) if told else 1.0
     fully = np.array([more * d.gain if d.in_full is None else d.in_full for d in found])
     errors = np.array([d.errors for d in found])
-    return Null(_mixed(fitted, fully, errors.sum(axis=1), more * chance), errors)
+    numbers = np.array([d.numbers for d in found])
+    return Null(_mixed(fitted, fully, errors.sum(axis=1), more * chance), errors, numbers)
 
 
 def _largest_in_full(drawn: Sequence[Drawn]) -> list[Drawn]:

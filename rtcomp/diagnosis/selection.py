@@ -37,7 +37,9 @@ class Search:
     baseline: Fitted
     chosen: Fitted
     null: Null | None = None
-    """Of the chosen model."""
+    """Of the chosen model, as it was when its replicates were made."""
+    replicated: Fitted | None = None
+    """That model."""
     beside: list[Candidate] | None = None
     """All candidates beside the chosen model, where they were looked at."""
     alternatives: list[Fitted] = field(default_factory=list)
@@ -88,7 +90,8 @@ def search(
             break
         null = judged.null
         before = replace(found)
-        found.chosen, found.null, found.beside = beam[0], null, judged.candidates or None
+        found.chosen = found.replicated = beam[0]
+        found.null, found.beside = null, judged.candidates or None
         found.elsewhere, found.cut = False, judged.cut
         found.alternatives = [g for g in grown if len(g.terms) == len(beam[0].terms) and g is not beam[0]]
         _skipped(found, judged.cut)

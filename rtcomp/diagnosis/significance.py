@@ -17,10 +17,12 @@ MEAN, KURTOSIS = 0.5772156649, 5.4
 
 @dataclass(frozen=True)
 class Null:
-    """Largest gains, one a replicate, (R,), and squared errors that replicates leave in blocks, (R, B)."""
+    """What replicates show: their largest gains, (R,), and the squared errors that they leave, (R, B)."""
 
     gains: Floats
     errors: Floats
+    numbers: Floats | None = None
+    """(R, p + q): what a fit of each finds of the numbers that made it; None where none was made."""
 
     @property
     def noise(self) -> float:

@@ -25,10 +25,10 @@ DRAWS = 16
 COUNTS = 1.5
 """How far a reading may go about at rest, in counts of the sensor."""
 MUCH = 0.03
-"""Part of the drive's force (rms). Where friction may make more of it unseen, and the balance leaves more of
-it open on a replicate of its own fit, it is no judge. Of 29 geared joints with a 12-bit encoder it left 0.005
-to 0.031, of one with a play 0.23, and gave no wrong name; of two pendulums whose friction yields within a
-count 0.036 and 0.045, of a measured servo 0.38, and was wrong. The gap between is narrow."""
+"""Part of the drive's force (rms). A balance of forces that leaves more than noise is no judge where friction
+may make more than this of it unseen, and where it leaves more than this open on a replicate of its own fit.
+Of 33 geared joints with a 12-bit encoder it left 0.005 to 0.037, of one with a play 0.23, of two pendulums
+whose friction yields within a count 0.036 and 0.045, of a measured servo 0.38."""
 
 
 def trust(balance: ForceBalance) -> Floats:

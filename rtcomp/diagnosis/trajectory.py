@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from rtcomp.diagnosis.data import Data
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fit import STEPS, Fitter
 from rtcomp.diagnosis.fitted import Fitted, left_out
-from rtcomp.diagnosis.free import Free, Term, all_free_of, slopes
+from rtcomp.diagnosis.free import Free, Term, all_free_of, changed, slopes
 from rtcomp.diagnosis.other_forms import overtones
 from rtcomp.diagnosis.regression import Grams, Prior
 from rtcomp.diagnosis.replicate import replicate
@@ -265,9 +266,7 @@ class Trajectory(Fitter):
                 bounds = np.concatenate([prior.low, -wide]), np.concatenate([prior.high, wide])
                 moved = grams.solve(use, Prior(mean, precision, *bounds), variance)
                 other = c + np.clip(moved[: c.size] - c, -0.5, 0.5)
-                trial = list(terms)
-                for f, step in zip(free, moved[c.size :].tolist(), strict=True):
-                    f.put(trial, f.get(terms) + min(max(step, -f.most(terms)), f.most(terms)))
+                trial = changed(terms, free, moved[c.size :])
                 try:
                     after = self.residual(other, trial)
                 except ConfigError:
@@ -289,6 +288,14 @@ class Trajectory(Fitter):
                 slopes, damping = None, 1e-2
             variance = float(np.sum(rest[self.rows] ** 2)) / count
         return c, terms, left(c, rest, variance)
+
+    def moved_by(self, model: Fitted, change: Floats) -> Fitted:
+        """See `Fitter`."""
+        c, size = model.coefficients, model.coefficients.size
+        moved = np.clip(c + change[:size], model.prior.low, model.prior.high)
+        terms = changed(model.terms, model.free, change[size:])
+        rest = self.residual(moved, terms)
+        return replace(model, terms=tuple(terms), coefficients=moved, residual=rest)
 
     def _slopes(self, c: Floats, terms: list[Term], rest: Floats) -> Floats:
         """Return what the model changes by with each number, (p, n)."""
@@ -317,8 +324,7 @@ class Trajectory(Fitter):
         nowhere = slice(c.size, c.size)
         system = System(y, own, (nowhere,) * (len(self.balance.believed) + len(terms)))
         prior = self.belief.prior
-        wide = prior.extended(np.full(len(free), -np.inf), np.full(len(free), np.inf))
-        joint = Grams.of(np.concatenate([own, tangents]), y, self.block, self.blocks)
+        joint, wide = self.jointly(system, prior, tangents)
         sse = float(np.sum(rest[self.rows] ** 2))
         variance = sse / max(int(self.rows.sum()), 1)
         whole = np.concatenate([c, np.zeros(len(free))])
