@@ -66,10 +66,9 @@ def answer(
     sets: Sequence[Alternatives],
     reserved: Reserved,
     seed: int,
-    *,
-    late: bool = False,
+    ends: float,
 ) -> Diagnosis:
-    """Return the diagnosis that a search ends in; where it is `late`, without what takes long to tell."""
+    """Return the diagnosis that a search ends in, with what was not seen as far as the time `ends` allows."""
     balance, rest = fitter.balance, Rest.of(fitter, found)
     base, chosen = (_unbiased(fitter, found, model) for model in (found.baseline, found.chosen))
     spans = told(fitter, chosen)
@@ -94,8 +93,7 @@ def answer(
         [] if verdict == "consistent" else locate(view, before, after if named else None, seed, believed.axis)
     )
     beside = found.beside if final is chosen else None
-    blind = found.cut or (late and beside is None)
-    seen = [] if blind else sights(fitter, final, found.null, beside)
+    seen = [] if found.cut else sights(fitter, final, found.null, beside, ends)
     names = {n for e in named for n in e.names}
     return Diagnosis(
         verdict,

@@ -20,16 +20,20 @@ from rtcomp.diagnosis.significance import Null
 
 
 def sights(
-    fitter: Fitter, fitted: Fitted, null: Null | None, beside: Sequence[Candidate] | None = None
+    fitter: Fitter,
+    fitted: Fitted,
+    null: Null | None,
+    beside: Sequence[Candidate] | None = None,
+    ends: float = math.inf,
 ) -> list[Sight]:
-    """Return from which size on every effect would have been seen beside a fitted model.
+    """Return from which size on effects would have been seen beside a fitted model.
 
     To first order: the part of its force that the model cannot make up for, against the gain that chance
     makes in one of a hundred recordings. Of an effect at several starting values, the plainest counts.
-    `beside` are all candidates beside the model, where they are known.
+    `beside` are all candidates beside the model, where they are known; else those made up to the time `ends`.
     """
     balance = fitter.balance
-    made = beside or look(fitter, fitted).candidates
+    made = beside or look(fitter, fitted, ends).candidates
     use = fitter.rows
     model = fitted.free_columns[:, use]
     norm = np.sqrt(np.einsum("ij,ij->i", model, model))

@@ -103,7 +103,7 @@ def _diagnosed(
     say(0.5, "judge")
     if fitter.balance is not balance:
         reserved = Reserved(fitter.balance)
-    done = answer(stage, fitter, found, sets, reserved, seed, late=time.monotonic() > ends)
+    done = answer(stage, fitter, found, sets, reserved, seed, ends)
     say(1.0, "judge")
     notes = [BAND_LIMITED] if len(objectives) > 1 and not fitter.balance.data.held else []
     if done.position is not None:
