@@ -52,6 +52,9 @@ def integrate(
 ) -> None:
     """Advance the wires `w` and states `s` by `count` steps of together `seconds`, `volts` held.
 
+    A drive that changes within a step (a late command) states the mean of its force over that: its impulse is
+    that mean's, and what acts at the end goes on into the next step.
+
     base: mass (kg), force constant (N/V), largest stiffness (N/m), and the tangent stiffness of the last
     step (N/m), which is kept there.
     """
@@ -65,7 +68,8 @@ def integrate(
     w[GAIN] = base[1]
     w[DRIVE] = 0.0
     run_chain(steps, p, s, w, 0, drives)
-    a = w[ACCELERATION] + (w[DRIVE] - before) / w[MASS]
+    driven = w[DRIVE]
+    a = w[ACCELERATION] + (driven - before) / w[MASS]
     w[STEP] = h
     x, v = w[POSITION], w[VELOCITY]
     elastic = w[FRICTION] - w[PUSH]
@@ -82,13 +86,22 @@ def integrate(
         w[VOLTS] = volts
         renew(w, base[0], base[1])
         run_chain(steps, p, s, w, 0, effects)
+        within = 0.0
+        if w[DRIVE] != driven:
+            mean = w[DRIVE]
+            w[STEP], w[VOLTS], w[GAIN], w[DRIVE] = 0.0, volts, base[1], 0.0
+            run_chain(steps, p, s, w, 0, drives)
+            w[STEP] = h
+            if w[DRIVE] != mean:
+                within = mean - 0.5 * (driven + w[DRIVE])
+            driven = w[DRIVE]
         a = (w[DRIVE] + w[PUSH] - w[FRICTION]) / w[MASS]
         if moved != 0.0:
             # Damping near a turning point can make this anything; outside these bounds it is no stiffness.
             tangent = min(max((w[FRICTION] - w[PUSH] - elastic) / moved, 0.0), stiffest)
         elastic = w[FRICTION] - w[PUSH]
         kick = 0.5 * h * a * impulse_scale(tangent, w[MASS], h)
-        v = half + kick
+        v = half + kick + h * within / w[MASS]
     w[VELOCITY] = v
     w[ACCELERATION] = a
     base[3] = tangent

@@ -58,6 +58,23 @@ def drive(simulator, volts, period):
     return out
 
 
+@settings(max_examples=40, deadline=None)
+@given(delay=st.floats(1e-5, 9e-3), substeps=st.integers(1, 5))
+def test_a_late_command_gives_its_impulse_whenever_it_changes(delay, substeps):
+    axis = stage(mass=2.0, effects=[{"name": "drive-delay", "delay": delay}])
+    volts = np.random.default_rng(3).uniform(-5.0, 5.0, 40)
+    found = drive(Simulator(axis, substeps=substeps), volts, 1e-3)
+    edges = 1e-3 * np.arange(volts.size + 1)
+    impulse = np.concatenate([[0.0], np.cumsum(4.0 * volts) * 1e-3])
+    late = np.interp(edges[1:] - delay, edges, impulse)
+    np.testing.assert_allclose(found[:, 1], late / 2.0, atol=1e-12)
+    time = np.linspace(0.0, edges[-1], 400_001)
+    speed = np.interp(time - delay, edges, impulse) / 2.0
+    way = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * (time[1] - time[0])])
+    step = 1e-3 / substeps
+    assert np.abs(found[:, 0] - np.interp(edges[1:], time, way)).max() < 4.0 * 5.0 / 2.0 * step**2 * 40
+
+
 def relative(a, b):
     return np.sqrt(np.mean((a - b) ** 2) / np.mean(b**2))
 
