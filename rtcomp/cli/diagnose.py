@@ -71,8 +71,10 @@ def diagnose(
       rtcomp diagnose run.h5 --stage configs/leuven.yaml --out out/diagnosis
       rtcomp diagnose a.csv b.csv --stage stage.yaml --map position=qm --map voltage=vir
     """
+    import time
     from dataclasses import replace
 
+    began = time.monotonic()  # reading the recordings is part of the budget
     from rtcomp.diagnosis.admit import admit
     from rtcomp.diagnosis.readings import in_si_units
     from rtcomp.recording.acted import as_acted
@@ -97,7 +99,7 @@ def diagnose(
         with Steps(quiet=as_json) as steps:
             held = None if between is None else between == "held"
             found = diagnosed(
-                stage, data, held=held, budget=budget, seed=seed, located=steps.located,
+                stage, data, held=held, budget=budget, began=began, seed=seed, located=steps.located,
                 progress=lambda done, name: steps.update(name, done),
             )  # fmt: skip
         found = replace(found, notes=list(dict.fromkeys([*notes, *found.notes])))

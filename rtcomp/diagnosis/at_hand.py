@@ -7,14 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.balance import ForceBalance, System
+from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.entries import Entry
-from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.free import Free, Term, slopes
+from rtcomp.diagnosis.regression import System
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
-STIFFER = 1.01
-"""Times its stiffness by which the whole of friction is made stiffer, to see what asks for that."""
+MORE = 0.01
+"""Part by which stiffness or level of the whole of friction is made larger, to see what asks for it."""
 CONSISTENT = 0.02
 """Part of its level by which friction may be away from that which its columns were made for."""
 HUGE = 1e150
@@ -36,18 +37,45 @@ def system_around(
 ) -> System:
     """Return the system made for friction of `weights` (N/m), to first order around coefficients (p,).
 
-    The stiffness of the whole is the sum of the units'. So what asks for it changes with each unit's alike,
-    and a fine one, which hardly holds a force, would be free to move it: this is part of their columns.
-    Raises ConfigError where a force grows beyond all bounds.
+    Stiffness and level of the whole are sums over the units. So what asks for them changes with each unit's
+    own part, and a fine one, which hardly holds a force, would be free to move the stiffness: this is part of
+    their columns. Raises ConfigError where a force grows beyond all bounds.
     """
-    system, stiffness = balance.system(entries, weights), float(weights.sum())
-    if around is None or stiffness <= 0.0 or not goes_by_whole(balance, entries):
+    system = balance.system(entries, weights)
+    if around is None or not weights.any() or not goes_by_whole(balance, entries):
         return _bounded(system)
-    change = balance.error(entries, around, weights) - balance.error(entries, around, weights, STIFFER)
-    change /= (STIFFER - 1.0) * stiffness
-    columns = system.columns.copy()
-    columns[balance.friction] += change
-    return _bounded(System(system.y + stiffness * change, columns, system.of_entry))
+    scale, left = balance.left(entries, around, weights)
+    y, columns = system.y, system.columns.copy()
+    for each, larger in ((np.ones(weights.size), (1.0 + MORE, 1.0)), (balance.reaches, (1.0, 1.0 + MORE))):
+        change = scale * (left - balance.left(entries, around, weights, larger)[1]) / MORE
+        columns[balance.friction] += np.outer(each / (each @ weights), change)
+        y = y + change
+    return _bounded(System(y, columns, system.of_entry, scale))
+
+
+def tangents_of(
+    balance: ForceBalance,
+    terms: list[Term],
+    free: Sequence[Free],
+    system: System,
+    c: Floats,
+    weights: Floats,
+) -> tuple[Floats, Floats]:
+    """Return what the error changes by with each free parameter, (q, n), coefficients held.
+
+    And what it would change by, were its scale held: that is for blocks left out, which a number that only
+    makes the error smaller does not predict.
+    """
+    scale, rest = system.scale, (system.y - c @ system.columns) / system.scale
+    if free and by_weights(balance, [t.entry for t in terms]):  # columns may be made for another friction
+        scale, rest = balance.left([t.entry for t in terms], c, weights)
+
+    def change(trial: list[Term]) -> Floats:
+        own, left = balance.left([t.entry for t in trial], c, weights)
+        return np.concatenate([scale * rest - own * left, scale * (rest - left)])
+
+    both = slopes(terms, free, change, 2 * rest.size)
+    return both[:, : rest.size], both[:, rest.size :]
 
 
 def _bounded(system: System) -> System:

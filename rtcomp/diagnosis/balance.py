@@ -11,7 +11,7 @@ by how far the motion stands above the sensor's noise (`noise.Whitening`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from rtcomp.diagnosis.data import Data, Segment
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.noise import Noise, Whitening
 from rtcomp.diagnosis.reaches import MOST_OWN, joined
+from rtcomp.diagnosis.regression import System
 from rtcomp.diagnosis.signals import BASE, Signals
 from rtcomp.diagnosis.spectrum import filtered, spectrum
 from rtcomp.diagnosis.sticking import trust
@@ -31,14 +32,8 @@ from rtcomp.physics import Effect, Place
 from rtcomp.stage.balance import around_rows, forces, parts_of_drive
 from rtcomp.stage.stage import Stage
 
-
-@dataclass(frozen=True)
-class System:
-    """``y = A c`` in whitened units: y (n,), columns (p, n); numbers of entries' columns by entry."""
-
-    y: Floats
-    columns: Floats
-    of_entry: tuple[slice, ...]
+PLAIN = (1.0, 1.0)
+"""Times its stiffness and its level, where the whole of friction is as it is."""
 
 
 class ForceBalance(Signals):
@@ -152,16 +147,27 @@ class ForceBalance(Signals):
             at += len(found)
         columns = np.concatenate(rows)
         scale = self._scale(y, by_load)
-        return System(scale * y, scale * columns if scale != 1.0 else columns, tuple(spans))
+        return System(scale * y, scale * columns if scale != 1.0 else columns, tuple(spans), scale)
 
-    def error(
-        self, entries: Sequence[Entry], c: Floats, weights: Floats | None = None, stiffer: float = 1.0
-    ) -> Floats:
-        """Return ``y - A c`` (n,) of `system` for given coefficients, filtered as one signal: far cheaper.
+    def error(self, entries: Sequence[Entry], c: Floats, weights: Floats | None = None) -> Floats:
+        """Return ``y - A c`` (n,) of `system` for given coefficients, filtered as one signal: far cheaper."""
+        scale, left = self.left(entries, c, weights)
+        return np.asarray(scale * left)
 
-        With the whole of friction so many times `stiffer` than its `weights` make it, for what asks for that.
+    def left(
+        self,
+        entries: Sequence[Entry],
+        c: Floats,
+        weights: Floats | None = None,
+        larger: tuple[float, float] = PLAIN,
+    ) -> tuple[float, Floats]:
+        """Return the scale of that error, and the error (n,) without it.
+
+        Derivatives hold the scale: with it, a number that only makes the error smaller would explain all.
+        Stiffness and level of the whole of friction are so many times `larger` than `weights` make them, for
+        what asks for these.
         """
-        drive, base, added, by_load = self._groups(entries, weights, stiffer)
+        drive, base, added, by_load = self._groups(entries, weights, larger)
         y = self._whitened(drive)[0]
         out = y.copy()
         pending: list[Floats] | None = None
@@ -183,7 +189,7 @@ class ForceBalance(Signals):
             pending = signals if pending is None else [p + q for p, q in zip(pending, signals, strict=True)]
         if pending is not None:
             out -= self.compared(pending)[0]
-        return np.asarray(self._scale(y, by_load) * out)
+        return self._scale(y, by_load), out
 
     def forces_of(self, entries: Sequence[Entry]) -> Floats:
         """Return the columns (p, n) of the last of `entries`, which adds a force; they are not kept."""
@@ -208,7 +214,7 @@ class ForceBalance(Signals):
         return float(np.sqrt(max(whole / left, 1.0)))
 
     def _groups(
-        self, entries: Sequence[Entry], weights: Floats | None, stiffer: float = 1.0
+        self, entries: Sequence[Entry], weights: Floats | None, larger: tuple[float, float] = PLAIN
     ) -> tuple[Group, list[Group], list[list[Group]], Group | None]:
         """Return the drive side, the columns of base and of each entry, the friction that loads make."""
         everything, adding, work = self.at_work(entries)
@@ -219,7 +225,7 @@ class ForceBalance(Signals):
         forces_added = [ent.build(e) for e, adds in zip(everything, adding, strict=True) if adds]
         side = self._side(drive, sensors)
         load = self._carried(bodies, forces_added, weights)
-        base, by_load = self._base(drive, sensors, modifiers, bodies, forces_added, load, weights, stiffer)
+        base, by_load = self._base(drive, sensors, modifiers, bodies, forces_added, load, weights, larger)
         added = [
             [self._added(made, sensors, load) for made in ent.basis(e)] if adds else []
             for e, adds in zip(everything, adding, strict=True)
@@ -335,4 +341,4 @@ class ForceBalance(Signals):
         return np.concatenate([s[self._whitening.rows(segment)] for segment, s in pairs])
 
 
-__all__ = ["BASE", "ForceBalance", "System"]
+__all__ = ["BASE", "ForceBalance"]

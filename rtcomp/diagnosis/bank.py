@@ -53,16 +53,17 @@ def units_along(
     start: Floats | None = None,
     least_parts: int = 1,
     sizes: Floats | None = None,
-    stiffer: float = 1.0,
+    larger: tuple[float, float] = (1.0, 1.0),
 ) -> Floats:
     """Return the force (N) of each unit around the rows of a motion, (K, 3 + reaches).
 
     With `sizes` of the stop elements, (reaches,), their sum times these instead of them: (K, 4).
 
     `motion` is (K, 5): time (s), position (m), velocity, acceleration, the command held up to each row (V);
-    `weights` (N/m) of the stop elements make the friction at hand, the whole of it so many times `stiffer`;
-    `start` (m) are their deflections before the motion, nothing where it is not given. `drive` effects only
-    tell the load. A row is cut into `least_parts`, or more where an effect needs it.
+    `weights` (N/m) of the elements make the friction at hand; what asks for the whole of it finds its
+    stiffness and its level so many times `larger`. `start` (m) are the deflections of the elements before the
+    motion, nothing where it is not given. `drive` effects only tell the load. A row is cut into `least_parts`,
+    or more where an effect needs it.
     """
     below = stage.mechanics.micro_damping_speed
     units: list[Effect] = [
@@ -94,7 +95,7 @@ def units_along(
     whole = bool(bent or after) or any(e.whole_friction for e in before)
     _along(
         program.steps, program.p, program.s, w, base, motion, parts, smooth, whole, len(before), len(bent),
-        stiffer, weights, reaches, deflection, sizes is not None, times, out, mean,
+        *larger, weights, reaches, deflection, sizes is not None, times, out, mean,
     )  # fmt: skip
     found = around_rows(out) if parts == 1 else mean
     if smooth:
@@ -128,6 +129,7 @@ def _along(
     first: int,
     bent: int,
     stiffer: float,
+    higher: float,
     weights: Floats,
     reaches: Floats,
     deflection: Floats,
@@ -160,7 +162,7 @@ def _along(
         for j in range(1, parts + 1):
             along_row(w, motion, k, float(j), parts)
             renew(w, base[0], base[1])
-            w[GRIP_LEVEL], w[GRIP_STIFFNESS] = level, stiffness
+            w[GRIP_LEVEL], w[GRIP_STIFFNESS] = higher * level, stiffness
             run_chain(steps, p, s, w, 0, first)
             if j == parts or not smooth:
                 for i in range(SPEED_UNITS):

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.balance import BASE, ForceBalance, System
+from rtcomp.diagnosis.balance import BASE, ForceBalance
 from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.regression import Prior
+from rtcomp.diagnosis.regression import Prior, System
 from rtcomp.diagnosis.settings import BELIEF_SD
 
 FURTHEST = 5.0

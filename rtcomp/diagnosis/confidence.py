@@ -27,6 +27,9 @@ SET_LEVEL = 0.05
 """Level of the confidence set."""
 CELLS = 10
 """Parts of a block over which models are compared: each with many rows, together many."""
+ANOTHER = 0.5
+"""Part of its gain in an effect's place that another still has beside it, from which on the two do not
+explain the same."""
 NEAR = 0.5
 """Part of the best screened gain from which on a candidate is fitted in another's place."""
 DIGITS = 3
@@ -65,6 +68,7 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         least = (1.0 - ALIAS) * log_gain(rest.errors, chosen.errors)
         members = {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
         members |= set(confidence_set(errors, SET_LEVEL))
+        members -= {k for k in members if k and _explains_another(fitter, chosen, rest, models[k], ends)}
         plainer = min(members, key=lambda k: (models[k].size, -weight[k]))
         if models[plainer].size < chosen.size and weight[plainer] > weight[0]:
             found.alternatives = [m for m in found.alternatives if m is not models[plainer]] + [chosen]
@@ -103,6 +107,17 @@ def _by_cell(fitter: Fitter, model: Fitted, at: int) -> Floats:
     used = fitter.use[block]
     found = np.bincount(cell[used], model.residual[used] ** 2, fitter.blocks * CELLS)
     return np.asarray(found[np.bincount(cell[used], minlength=found.size) > 0] + 1e-300)
+
+
+def _explains_another(fitter: Fitter, chosen: Fitted, rest: Fitted, other: Fitted, ends: float) -> bool:
+    """Tell whether what stands in an effect's place gains as much beside it: then it is no rival of it.
+
+    Two effects may gain alike without explaining the same rows. `rest` is the chosen model without this one.
+    """
+    return any(
+        log_gain(chosen.errors, both.errors) > ANOTHER * log_gain(rest.errors, other.errors)
+        for both in fitted_in_time(fitter, chosen, other.terms[-1:], ends)
+    )
 
 
 def _may_be_no_wave(fitter: Fitter, found: Search, at: int) -> bool:

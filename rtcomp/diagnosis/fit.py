@@ -16,17 +16,24 @@ import numpy as np
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis import starting
-from rtcomp.diagnosis.at_hand import by_weights, consistent, goes_by_whole, newly_behind, system_around
-from rtcomp.diagnosis.balance import BASE, ForceBalance, System
+from rtcomp.diagnosis.at_hand import (
+    by_weights,
+    consistent,
+    goes_by_whole,
+    newly_behind,
+    system_around,
+    tangents_of,
+)
+from rtcomp.diagnosis.balance import BASE, ForceBalance
 from rtcomp.diagnosis.believed import prior_of
 from rtcomp.diagnosis.cache import KEPT_ONCE, Cache
 from rtcomp.diagnosis.data import Data
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitted import Fitted, left_out
-from rtcomp.diagnosis.free import Free, Term, changed, free_of, slopes
+from rtcomp.diagnosis.free import Free, Term, changed, free_of
 from rtcomp.diagnosis.noise import Noise
 from rtcomp.diagnosis.other_forms import other_beliefs, other_forms, variants
-from rtcomp.diagnosis.regression import Grams, Prior
+from rtcomp.diagnosis.regression import Grams, Prior, System
 from rtcomp.diagnosis.result import PositionFit
 from rtcomp.diagnosis.retuned import level_and_reach
 from rtcomp.diagnosis.stage_of import stage_of
@@ -245,8 +252,8 @@ class Fitter:
         free = free_of(current, b)
         damping, tangents = 1e-3, None
         for _ in range(steps if free else 0):
-            tangents = self._tangents(current, free, system, c, weights)
-            joint, wide = self.jointly(system, prior, tangents)
+            tangents = tangents_of(b, current, free, system, c, weights)
+            joint, wide = self.jointly(system, prior, tangents[0])
             power = np.diag(joint.gram[self.use].sum(axis=0))[c.size :]
             improved = False
             for _ in range(4):
@@ -280,8 +287,8 @@ class Fitter:
                 system, prior, _, c, sse = self.solve(current, weights, variance, c)
                 made_for, weights, turns, tangents = weights, c[b.friction], turns - 1, None
         if tangents is None:
-            tangents = self._tangents(current, free, system, c, weights)
-        done = self._finished(current, free, system, prior, c, tangents, sse, variance, weights)
+            tangents = tangents_of(b, current, free, system, c, weights)
+        done = self._finished(current, free, system, prior, c, tangents[1], sse, variance, weights)
         settled = not goes_by_whole(b, entries) or consistent(b, made_for, weights)
         return done if settled else self._as_it_is(done)
 
@@ -341,10 +348,3 @@ class Fitter:
             term.with_entry(ent.composed(term.entry, c[span])) if span.stop > span.start else term
             for term, span in zip(terms, spans, strict=True)
         ]
-
-    def _tangents(
-        self, terms: list[Term], free: Sequence[Free], system: System, c: Floats, weights: Floats
-    ) -> Floats:
-        """Return what the model changes by with each free parameter, (q, n), coefficients held."""
-        b, rest = self.balance, system.y - c @ system.columns
-        return slopes(terms, free, lambda t: rest - b.error([one.entry for one in t], c, weights), rest.size)

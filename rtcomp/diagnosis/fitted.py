@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtcomp.diagnosis.balance import System
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.free import Free, Term
-from rtcomp.diagnosis.regression import Grams, Prior
+from rtcomp.diagnosis.regression import Grams, Prior, System
 from rtcomp.kernels import Floats
 
 ONCE = 0.5

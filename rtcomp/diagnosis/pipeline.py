@@ -53,6 +53,7 @@ def diagnose(
     *,
     held: bool | None = None,
     budget: float = BUDGET,
+    began: float | None = None,
     progress: Progress | None = None,
     located: Located | None = None,
     seed: int = 0,
@@ -60,14 +61,15 @@ def diagnose(
     """Say where `stage` and `recordings` (of one rate) differ, what is missing, and what it explains.
 
     `held` tells whether the command is held from row to row or goes on between rows as a band-limited
-    signal; None where both are to be tried. `budget` (s) ends the search with the best answer so far.
+    signal; None where both are to be tried. `budget` (s) ends the search with the best answer so far; it is
+    counted from the time `began` (time.monotonic), or from now.
     `progress` hears how far each step is, `located` the places of the mismatch before anything is named.
     Raises RtcompError where the budget does not do for the baseline.
     """
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1, user_api="blas"):  # the cores are shared out by `cores`
-        return _diagnosed(stage, recordings, held, budget, progress, located, seed)
+        return _diagnosed(stage, recordings, held, budget, began, progress, located, seed)
 
 
 def _diagnosed(
@@ -75,12 +77,13 @@ def _diagnosed(
     recordings: Sequence[Recording],
     held: bool | None,
     budget: float,
+    began: float | None,
     progress: Progress | None,
     located: Located | None,
     seed: int,
 ) -> Diagnosis:
     say: Progress = progress or (lambda _part, _what: None)
-    ends = time.monotonic() + budget
+    ends = (time.monotonic() if began is None else began) + budget
     say(0.0, "balance")
     objectives = _objectives(stage, recordings, held, ends - (1.0 - SEARCH) * budget)
     if time.monotonic() > ends:
@@ -97,7 +100,10 @@ def _diagnosed(
     hidden = untold(balance) > MUCH
     fitter, found = _searched(objectives, until(finish, FORCES) if hidden else finish, say, seed)
     if hidden and Rest.of(fitter, found).significant and hides(fitter, found.chosen):
-        fitter, found = _by_trajectory(stage, fitter, finish, say, seed)
+        if time.monotonic() < finish:
+            fitter, found = _by_trajectory(stage, fitter, finish, say, seed)
+        else:
+            found.not_tried.append("simulated positions in the place of forces")
     say(0.0, "tell apart")
     sets = alternatives(fitter, found, ends - (1.0 - TELL_APART) * budget)
     say(0.5, "judge")

@@ -16,6 +16,17 @@ RIDGE = 1e-9
 
 
 @dataclass(frozen=True)
+class System:
+    """``y = A c`` in whitened units: y (n,), columns (p, n); numbers of entries' columns by entry."""
+
+    y: Floats
+    columns: Floats
+    of_entry: tuple[slice, ...]
+    scale: float = 1.0
+    """By which y and columns were made larger, for what the residual depends less on the command."""
+
+
+@dataclass(frozen=True)
 class Prior:
     """What is believed of the coefficients: mean and precision (p,); precision 0 is no belief. And bounds."""
 

@@ -44,14 +44,21 @@ class Drawn:
 
 
 def null_of(
-    fitter: Fitter, fitted: Fitted, screen: Screen, gain: float, seed: int, ends: float = math.inf
+    fitter: Fitter,
+    fitted: Fitted,
+    screen: Screen,
+    gain: float,
+    seed: int,
+    full: float = math.inf,
+    ends: float = math.inf,
 ) -> Null:
     """Return the null distribution beside a fitted model.
 
     Replicates are drawn until it is plain whether `gain` and the error of the fit are beyond them: sequential
     Monte Carlo (Besag and Clifford 1991, Biometrika 78(2)). A model that cannot be kept on the recorded
     motion is judged by surrogates of its residual instead. The largest gains are those of full fits, the
-    others in proportion; after the time `ends` (time.monotonic) all are those of first order.
+    others in proportion; after the time `full` (time.monotonic) all are those of first order, and after
+    `ends` a few replicates must do.
     """
     try:
         stage = fitter.stage(fitted, between=True)
@@ -76,7 +83,7 @@ def null_of(
         if candidate is None or screened is None or screened.gain <= 0.0:
             return Drawn(0.0, errors, numbers)
         return Drawn(
-            screened.gain, errors, numbers, lambda: gain_in_full(other, again, candidate, screened, ends)
+            screened.gain, errors, numbers, lambda: gain_in_full(other, again, candidate, screened, full)
         )
 
     found: list[Drawn] = []
@@ -92,7 +99,7 @@ def null_of(
         if null.p_value(gain) < LEVEL or not null.plain(gain, fitted.errors, LEVEL):
             drawn = _largest_in_full(drawn)
             null = _null(fitted, [*found, *drawn], chance)
-        if null.plain(gain, fitted.errors, LEVEL):
+        if null.plain(gain, fitted.errors, LEVEL) or time.monotonic() > ends:
             break
         found += drawn
         first, last = last, min(last + MORE, REPLICATES)

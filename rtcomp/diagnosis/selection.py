@@ -82,7 +82,7 @@ def search(
             late = step > 0 and time.monotonic() > ends
             at_hand = first if step == 0 else None
             known = found.beside if fitter.by_force else None
-            seen = _judged(fitter, beam[0], seed + step, say, at_hand, known, until(ends, LOOKED), late=late)
+            seen = _judged(fitter, beam[0], seed + step, say, at_hand, known, ends, late=late)
             judged = _sound(seen, parents[id(beam[0])])
             if judged is None:
                 beam.pop(0)
@@ -289,7 +289,7 @@ def _judged(
     *,
     late: bool,
 ) -> Look:
-    """Return the look beside a model, which `ends` in time, with its null distribution.
+    """Return the look beside a model with its null distribution, in a part of the time up to `ends`.
 
     `first` is that look, where it was taken before; `known` are candidates beside a smaller model. Where it
     is too `late` for one, only what chance leaves is looked at.
@@ -299,9 +299,10 @@ def _judged(
     say(0.0, what)
     if late:
         first = Look([], [], Screen([], fitter), None)
-    seen = first or look(fitter, model, ends, known)
+    looked = until(ends, LOOKED)
+    seen = first or look(fitter, model, looked, known)
     say(0.5, what)
-    return replace(seen, null=null_of(fitter, model, seen.screen, seen.gain, seed, ends))
+    return replace(seen, null=null_of(fitter, model, seen.screen, seen.gain, seed, looked, ends))
 
 
 def _sound(seen: Look, parent: float) -> Look | None:

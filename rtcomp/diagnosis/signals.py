@@ -167,7 +167,7 @@ class Signals:
         adding: Sequence[Effect],
         carried: Carried | None,
         weights: Floats | None,
-        stiffer: float,
+        larger: tuple[float, float],
     ) -> tuple[list[Group], Group | None]:
         """Return the base's columns (mass; units of damping and friction; a constant force), the load's.
 
@@ -177,7 +177,7 @@ class Signals:
         others = sorted((e for e in bodies if not e.behind), key=lambda e: (e.place, e.order))
         second_masses = [e for e in others if e.moving_mass]
         on_load = [e for e in others if not e.moving_mass]
-        own = (weights.tobytes(), stiffer) if weights is not None and whole else ()
+        own = (weights.tobytes(), larger) if weights is not None and whole else ()
         before: list[Effect] = []
         if any(e.values.get("external") is not None for e in modifiers):
             chain = [e for e in self.stage.chain if e.place is Place.DRIVE]
@@ -209,7 +209,7 @@ class Signals:
             for s, path in zip(self.data.segments, driven(), strict=True):
                 pushed = replace(s, voltage=(1.0 + more) * s.voltage) if more else s
                 at_hand = weights if whole else None
-                found.append(self._units(pushed, path, before, modifiers, at_hand, some, times, stiffer))
+                found.append(self._units(pushed, path, before, modifiers, at_hand, some, times, larger))
             return found
 
         def of_sizes(sizes: Floats) -> list[Floats]:
@@ -272,7 +272,7 @@ class Signals:
         weights: Floats | None,
         some: np.ndarray | None = None,
         times: Floats | None = None,
-        stiffer: float = 1.0,
+        larger: tuple[float, float] = (1.0, 1.0),
     ) -> Floats:
         """Return the force (N, (K, p)) around the rows of damping and of friction units, all or `some`.
 
@@ -289,7 +289,7 @@ class Signals:
             times = times[some] if times is not None else None
         return units_along(
             self.stage, list(before), list(modifiers), reaches, held, np.ascontiguousarray(motion),
-            self.grain, start, PARTS, times, stiffer,
+            self.grain, start, PARTS, times, larger,
         )  # fmt: skip
 
     def _start(self, segment: Segment) -> Floats:

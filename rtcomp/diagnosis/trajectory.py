@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from rtcomp.diagnosis import starting
-from rtcomp.diagnosis.balance import ForceBalance, System
+from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.belief import LEVEL, Belief, is_sized
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.data import Data
@@ -23,7 +23,7 @@ from rtcomp.diagnosis.fit import STEPS, Fitter
 from rtcomp.diagnosis.fitted import Fitted, left_out
 from rtcomp.diagnosis.free import Free, Term, all_free_of, changed, slopes
 from rtcomp.diagnosis.other_forms import overtones
-from rtcomp.diagnosis.regression import Grams, Prior
+from rtcomp.diagnosis.regression import Grams, Prior, System
 from rtcomp.diagnosis.replicate import replicate
 from rtcomp.diagnosis.result import PositionFit
 from rtcomp.diagnosis.settings import BELIEF_SD
