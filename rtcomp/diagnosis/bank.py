@@ -61,9 +61,9 @@ def units_along(
 
     `motion` is (K, 5): time (s), position (m), velocity, acceleration, the command held up to each row (V);
     `weights` (N/m) of the elements make the friction at hand; what asks for the whole of it finds its
-    stiffness and its level so many times `larger`. `start` (m) are the deflections of the elements before the
-    motion, nothing where it is not given. `drive` effects only tell the load. A row is cut into `least_parts`,
-    or more where an effect needs it.
+    stiffness and its level so many times `larger`. `start` (m) are the deflections of the elements before
+    the motion, nothing where it is not given. `drive` effects only tell the load. A row is cut into
+    `least_parts`, or more where an effect needs it.
     """
     below = stage.mechanics.micro_damping_speed
     units: list[Effect] = [

@@ -28,7 +28,7 @@ class Told:
     nothing: bool
     """Every size of it may be neutral."""
     bound: tuple[str, ...]
-    """Parameters that are at a physical bound."""
+    """Parameters at a bound: a physical one, or what the recording could show at most."""
 
 
 def told(fitter: Fitter, fitted: Fitted) -> list[Told]:
@@ -49,7 +49,8 @@ def told(fitter: Fitter, fitted: Fitted) -> list[Told]:
         kind = ent.kind_of(term.entry)
         without, once = _without(fitted, i, span), _once(fitter, fitted, i, span)
         alone = _without(held, i, span)
-        values, neutral, bound = {}, [], []
+        values, neutral = {}, []
+        bound = [f.name for f in fitted.free if f.term == i and f.at_bound(fitted.terms)]
         for p in kind.parameters:
             if p.name not in term.entry:
                 continue
@@ -62,7 +63,7 @@ def told(fitter: Fitter, fitted: Fitted) -> list[Told]:
                 sd = _deviation(apart)
                 size = 2.0 if p.unit == ent.PHASE else abs(value)
                 half = math.hypot(factor * max(sd, once.get(p.name, 0.0)), MODEL * size)
-                if _at_bound(value, p.lowest, ent.highest(term.entry, p)):
+                if p.name not in bound and _at_bound(value, p.lowest, ent.highest(term.entry, p)):
                     bound.append(p.name)
             elif p.name == ent.MOMENT:
                 half = balance.data.period
