@@ -125,16 +125,16 @@ def candidates(
             return before
         return _candidate(fitter, fitted, *item)
 
-    # What changes nothing at its first point (friction, where there is none) is not tried at the others.
-    first = shared(make, [(kind, found[0]) for kind, found in points.items() if found])
-    shown = [c for c in first if c is not None]
+    # What changes nothing at its first and last point (friction, where there is none) is tried at no other.
+    own = {kind: [p for p in found if _first_form(kind, p)] for kind, found in points.items()}
+    outer = [(kind, found.pop(at)) for at in (0, -1) for kind, found in own.items() if found]
+    shown = [c for c in shared(make, outer) if c is not None]
     names = {c.name for c in shown}
-    own = {kind: [p for p in found[1:] if _first_form(kind, p)] for kind, found in points.items()}
     more = [(kind, point) for kind, found in own.items() for point in found if kind.name in names]
     shown += [c for c in shared(make, more) if c is not None]
     # A form differs in shape, not in where it is: the others are looked at where the first does most. Courses
     # in time differ in when they are.
-    forms = {kind: [p for p in found[1:] if not _first_form(kind, p)] for kind, found in points.items()}
+    forms = {kind: [p for p in found if not _first_form(kind, p)] for kind, found in points.items()}
     if explained is None or not shown or not any(forms.values()):
         return shown
     likely = _likely(shown, explained(shown))
