@@ -60,22 +60,12 @@ def tangents_of(
     system: System,
     c: Floats,
     weights: Floats,
-) -> tuple[Floats, Floats]:
-    """Return what the error changes by with each free parameter, (q, n), coefficients held.
-
-    And what it would change by, were its scale held: that is for blocks left out, which a number that only
-    makes the error smaller does not predict.
-    """
-    scale, rest = system.scale, (system.y - c @ system.columns) / system.scale
-    if free and by_weights(balance, [t.entry for t in terms]):  # columns may be made for another friction
-        scale, rest = balance.left([t.entry for t in terms], c, weights)
-
-    def change(trial: list[Term]) -> Floats:
-        own, left = balance.left([t.entry for t in trial], c, weights)
-        return np.concatenate([scale * rest - own * left, scale * (rest - left)])
-
-    both = slopes(terms, free, change, 2 * rest.size)
-    return both[:, : rest.size], both[:, rest.size :]
+) -> Floats:
+    """Return by how much less a model leaves with each free parameter, (q, n), coefficients held."""
+    rest = system.y - c @ system.columns
+    if free and by_weights(balance, [t.entry for t in terms]):  # its columns may be of another friction
+        rest = balance.error([t.entry for t in terms], c, weights)
+    return slopes(terms, free, lambda t: rest - balance.error([e.entry for e in t], c, weights), rest.size)
 
 
 def _bounded(system: System) -> System:

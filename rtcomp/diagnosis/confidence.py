@@ -68,7 +68,7 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         least = (1.0 - ALIAS) * log_gain(rest.errors, chosen.errors)
         members = {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
         members |= set(confidence_set(errors, SET_LEVEL))
-        members -= {k for k in members if k and _explains_another(fitter, chosen, rest, models[k], ends)}
+        members -= {k for k in members if k and explains_another(fitter, chosen, rest, models[k], ends)}
         plainer = min(members, key=lambda k: (models[k].size, -weight[k]))
         if models[plainer].size < chosen.size and weight[plainer] > weight[0]:
             found.alternatives = [m for m in found.alternatives if m is not models[plainer]] + [chosen]
@@ -109,7 +109,7 @@ def _by_cell(fitter: Fitter, model: Fitted, at: int) -> Floats:
     return np.asarray(found[np.bincount(cell[used], minlength=found.size) > 0] + 1e-300)
 
 
-def _explains_another(fitter: Fitter, chosen: Fitted, rest: Fitted, other: Fitted, ends: float) -> bool:
+def explains_another(fitter: Fitter, chosen: Fitted, rest: Fitted, other: Fitted, ends: float) -> bool:
     """Tell whether what stands in an effect's place gains as much beside it: then it is no rival of it.
 
     Two effects may gain alike without explaining the same rows. `rest` is the chosen model without this one.

@@ -253,7 +253,7 @@ class Fitter:
         damping, tangents = 1e-3, None
         for _ in range(steps if free else 0):
             tangents = tangents_of(b, current, free, system, c, weights)
-            joint, wide = self.jointly(system, prior, tangents[0])
+            joint, wide = self.jointly(system, prior, tangents)
             power = np.diag(joint.gram[self.use].sum(axis=0))[c.size :]
             improved = False
             for _ in range(4):
@@ -288,7 +288,7 @@ class Fitter:
                 made_for, weights, turns, tangents = weights, c[b.friction], turns - 1, None
         if tangents is None:
             tangents = tangents_of(b, current, free, system, c, weights)
-        done = self._finished(current, free, system, prior, c, tangents[1], sse, variance, weights)
+        done = self._finished(current, free, system, prior, c, tangents, sse, variance, weights)
         settled = not goes_by_whole(b, entries) or consistent(b, made_for, weights)
         return done if settled else self._as_it_is(done)
 

@@ -71,3 +71,22 @@ def test_columns_sum_up_to_the_error(fitter: Fitter, entry: dict[str, object]) -
     summed = b.error([entry], c, at_hand)
     system = b.system([entry], at_hand)
     assert summed == pytest.approx(system.y - c @ system.columns, abs=1e-4 * np.abs(system.y).max())
+
+
+def test_friction_by_load_is_fitted_with_what_loads_it() -> None:
+    """Its level is fitted with it, and no number of it makes blocks left out seem explained."""
+    hidden = [
+        {"name": "load-dependent-friction", "coefficient": 0.3},
+        {"name": "parallel-spring", "stiffness": 4000.0},
+    ]
+    recording = run(stage(effects=hidden), there_and_back(16.0))
+    balance = ForceBalance(stage(), load_data([recording]))
+    baseline(balance)
+    fitter = Fitter(balance)
+    starts = [{**hidden[0], "coefficient": 0.2, "stiffening": 0.0}, {**hidden[1], "stiffness": 2500.0}]
+    found = fitter.fit([Term.of(e) for e in starts])
+    assert found.entries[0]["coefficient"] == pytest.approx(0.3, rel=0.03)
+    assert found.entries[1]["stiffness"] == pytest.approx(4000.0, rel=0.03)
+    alone = fitter.fit([Term.of(starts[0])])  # a model that lacks something leaves more out than in
+    assert found.sse < found.errors.sum() < alone.errors.sum()
+    assert alone.sse < alone.errors.sum()

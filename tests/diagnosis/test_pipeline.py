@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from pathlib import Path
 from typing import Any
 
@@ -221,6 +222,12 @@ def test_the_way_a_command_goes_is_doubted(own: float, same: float, fewer: float
 def test_a_budget_that_does_not_do_for_the_baseline_is_refused() -> None:
     with pytest.raises(RtcompError, match=r"budget of 0\.001 s .* give it more"):
         diagnose(stage(), [run(stage(), motion(4.0))], budget=0.001)
+
+
+def test_a_budget_is_counted_from_where_it_began() -> None:
+    """Reading took as long as there was."""
+    with pytest.raises(RtcompError, match=r"budget of 60 s .* give it more"):
+        diagnose(stage(), [run(stage(), motion(4.0))], budget=60.0, began=time.monotonic() - 60.0)
 
 
 def test_a_short_budget_gives_the_best_answer_so_far_and_says_what_was_not_tried() -> None:

@@ -1,0 +1,66 @@
+"""Candidates: which effects are looked at, and what stands in another's place."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from recorded import RATE, run, stage, there_and_back
+
+from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.baseline import baseline
+from rtcomp.diagnosis.candidates import candidates
+from rtcomp.diagnosis.confidence import explains_another
+from rtcomp.diagnosis.data import load_data
+from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.free import Term
+from rtcomp.kernels import Floats
+
+WAVE = {"name": "cogging", "amplitude": 0.4, "period": 1.3e-4, "phase": 0.4}
+TONE = {"name": "tonal-disturbance", "amplitude": 0.4, "frequency": 23.0, "phase": 0.0}
+
+
+def fitter_of(reference: Floats, *effects: dict[str, object], run_in: int = 0) -> Fitter:
+    """A fitter on a recording of an axis with these effects, of which the belief has none."""
+    data = load_data([run(stage(effects=list(effects)), reference)])
+    balance = ForceBalance(stage(), replace(data, segments=(replace(data.segments[0], run_in=run_in),)))
+    baseline(balance)
+    return Fitter(balance)
+
+
+def test_an_effect_that_changes_nothing_where_it_is_tried_first_is_tried_elsewhere() -> None:
+    """A stop is tried from the lowest position on, where the axis is only in the run-in."""
+    reference = there_and_back(12.0)
+    moment = np.arange(reference.size) / RATE
+    low_once = 2e-3 * np.sin(np.pi * np.clip(moment / 0.8, 0.0, 1.0)) ** 2
+    fitter = fitter_of(reference - low_once, run_in=1000)
+    low, _ = fitter.balance.data.stroke
+    places = fitter.balance.plain([s.position for s in fitter.balance.data.segments])
+    assert places.min() > 0.5 * low
+    assert "end-stop" in {c.name for c in candidates(fitter, fitter.fit([]))}
+
+
+@pytest.fixture(scope="module")
+def shaken() -> Fitter:
+    """A recording in which a wave of the position and a tone act."""
+    return fitter_of(there_and_back(12.0), WAVE, TONE)
+
+
+@pytest.mark.parametrize(
+    ("chosen", "other", "apart"),
+    [
+        (WAVE, TONE, True),
+        (TONE, WAVE, True),
+        (WAVE, {**WAVE, "period": 1.31e-4}, False),
+        ({"name": "drive-delay", "delay": 1e-3}, {"name": "sensor-delay", "delay": 1e-3}, False),
+    ],
+)
+def test_a_rival_of_an_effect_explains_the_same(
+    shaken: Fitter, chosen: dict[str, object], other: dict[str, object], apart: bool
+) -> None:
+    """Two that gain as much together as one after the other are no rivals."""
+    rest = shaken.fit([])
+    models = [shaken.fit([Term.of(e)], rest) for e in (chosen, other)]
+    assert explains_another(shaken, models[0], rest, models[1], math.inf) is apart
