@@ -289,8 +289,7 @@ class Fitter:
         if tangents is None:
             tangents = tangents_of(b, current, free, system, c, weights)
         done = self._finished(current, free, system, prior, c, tangents, sse, variance, weights)
-        settled = not goes_by_whole(b, entries) or consistent(b, made_for, weights)
-        return done if settled else self._as_it_is(done)
+        return self._as_it_is(done) if goes_by_whole(b, entries) else done
 
     def moved_by(self, model: Fitted, change: Floats) -> Fitted:
         """Return a model with coefficients and nonlinear parameters, (p + q,), others by `change`.
@@ -306,7 +305,7 @@ class Fitter:
         return replace(model, terms=tuple(terms), coefficients=moved, residual=rest, weights=moved[own])
 
     def _as_it_is(self, model: Fitted) -> Fitted:
-        """Return a model with the error of its own friction, where its columns were made for another.
+        """Return a model with the error of its own friction: its columns were made for one much like it.
 
         What depends on the level of friction, as friction by load, else explains by a level of its own.
         """
