@@ -144,9 +144,9 @@ def _only_forms(fitter: Fitter, chosen: Fitted, at: int) -> Floats:
 
 def _of_the_force(fitter: Fitter, rest: Fitted, without: Fitted, null: Null | None) -> float:
     """Return the part of the force that is left of what there is `without` an effect, squared."""
-    noise, louder = null.noise if null is not None else 0.0, fitter.louder(rest)
-    left, there = (fitter.above_noise(model, louder) ** 2 for model in (rest, without))
-    beyond = max(1.0 - noise / max(float(rest.errors.sum()), 1e-300), 0.0)
+    noise, louder = null.noise if null is not None else math.inf, fitter.louder(rest)
+    left, there = (fitter.above_noise(model, louder, noise) ** 2 for model in (rest, without))
+    beyond = max(1.0 - noise / max(float(rest.errors.sum()), 1e-300), 0.0) if null is not None else 1.0
     return left * beyond / max(there, 1e-300)
 
 

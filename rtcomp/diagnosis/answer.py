@@ -48,10 +48,11 @@ class Rest:
     def of(cls, fitter: Fitter, found: Search) -> Rest:
         """Measure it against the replicates of the chosen model."""
         error, first = float(found.chosen.errors.sum()), float(found.baseline.errors.sum())
-        relative = fitter.above_noise(in_any_form(fitter, found.chosen, fitter.other_friction(found.chosen)))
+        noise = found.null.noise if found.null is not None else math.inf
+        rest = in_any_form(fitter, found.chosen, fitter.other_friction(found.chosen))
+        relative = fitter.above_noise(rest, noise=noise)
         if found.null is None:
             return cls(relative > TOLERANCE, 1.0 if not found.chosen.terms else error / first)
-        noise = found.null.noise
         share = max(error - noise, 0.0) / max(first - noise, 1e-300)
         # Of many small things none of which could be named, the square counts: they do not add up to one.
         matters = relative > TOLERANCE and (not found.chosen.terms or share > LEAST_GAIN)

@@ -166,12 +166,17 @@ class Fitter:
         sizes = [s.time[b.whitening.rows(s)].size for s in b.data.segments]
         return b.whitening.louder(np.split(model.residual, np.cumsum(sizes)[:-1]), b.noise, b.data)
 
-    def above_noise(self, model: Fitted, louder: float = 1.0) -> float:
-        """Return that relative error (rms) above that of noise, so many times `louder`."""
+    def above_noise(self, model: Fitted, louder: float = 1.0, noise: float = math.inf) -> float:
+        """Return that relative error (rms) above that of noise, so many times `louder`.
+
+        Where replicates leave less than white noise does, their squared error is the `noise`: counts are not
+        white where an axis is slow.
+        """
         weight = self.balance.trust**2
         power = float(np.sum(weight * self.balance.drive_force() ** 2) / np.sum(weight))
-        noise = louder**2 * self.balance.noise_power / max(power, 1e-300)
-        return float(np.sqrt(max(self.relative(model) ** 2 - noise, 0.0)))
+        white, left = self.balance.noise_power / max(power, 1e-300), self.relative(model) ** 2
+        told = left * noise / max(float(model.errors.sum()), 1e-300)
+        return float(np.sqrt(max(left - louder**2 * min(white, told), 0.0)))
 
     def numbers(self, model: Fitted, *, effects: bool) -> tuple[Floats, Floats, Floats]:
         """Return mass, damping, level and reach of friction, and sizes of believed `effects` by amount.

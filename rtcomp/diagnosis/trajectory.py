@@ -159,10 +159,10 @@ class Trajectory(Fitter):
         """See `Fitter`: no louder, so short a window tells no spectrum."""
         return 1.0
 
-    def above_noise(self, model: Fitted, louder: float = 1.0) -> float:
+    def above_noise(self, model: Fitted, louder: float = 1.0, noise: float = math.inf) -> float:
         """See `Fitter`: a reading and that at the window's begin are both noisy."""
-        noise = 2.0 * (louder * self.balance.noise.rms / self.scale) ** 2 * np.count_nonzero(self.rows)
-        return float(np.sqrt(max(self.relative(model) ** 2 - noise / max(self._power, 1e-300), 0.0)))
+        read = 2.0 * (louder * self.balance.noise.rms / self.scale) ** 2 * np.count_nonzero(self.rows)
+        return float(np.sqrt(max(self.relative(model) ** 2 - read / max(self._power, 1e-300), 0.0)))
 
     def has_offset(self, model: Fitted) -> bool:
         """See `Fitter`: none beside the entries."""
