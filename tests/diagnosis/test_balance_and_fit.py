@@ -119,6 +119,18 @@ def test_a_judgement_counts_forces_that_stand_above_the_sensors_noise() -> None:
     assert noise_seen(balance) < 1.05 * balance.noise_power**0.5
 
 
+def test_noise_is_what_replicates_leave_but_no_more_than_white_noise() -> None:
+    """Without any all of the error is above it; from some size on replicates say no more than white noise."""
+    balance = ForceBalance(stage(), load_data([run(stage(viscous=30.0), there_and_back())]))
+    baseline(balance)
+    fitter = Fitter(balance)
+    model = fitter.fit([])
+    left = [fitter.above_noise(model, noise=part * float(model.errors.sum())) for part in (0.0, 1e-3, 1.0)]
+    assert left[0] == pytest.approx(fitter.relative(model))
+    assert left[0] > left[1] >= left[2]
+    assert min(left) >= fitter.above_noise(model)
+
+
 def test_a_judgement_needs_motion_in_the_reserved_blocks() -> None:
     believed, moving = stage(), there_and_back(20.0)
     t = np.arange(moving.size) / 1000.0

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from recorded import RATE, run, stage
+from recorded import RATE, run, stage, there_and_back
 
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import baseline
 from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.intervals import numbers
+from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.intervals import numbers, told
 from rtcomp.diagnosis.spread import MODEL
 
 
@@ -44,3 +45,16 @@ def test_a_number_of_little_force_is_known_less_well() -> None:
         half[viscous] = found.half[1] / viscous
         assert abs(found.values[1] - viscous) <= found.half[1]
     assert half[800.0] < 3.0 * MODEL < 0.1 < half[8.0]
+
+
+@pytest.mark.parametrize(("hidden", "at_bound"), [(2e-4, True), (2e-2, False)])
+def test_a_number_below_what_a_recording_can_show_is_told_to_be_at_its_bound(
+    hidden: float, at_bound: bool
+) -> None:
+    """A time within a row is no finding, however well it fits."""
+    creep = {"name": "creep", "fraction": 0.5, "time_constant": hidden}
+    balance = ForceBalance(stage(), load_data([run(stage(effects=[creep]), there_and_back(12.0))]))
+    baseline(balance)
+    fitter = Fitter(balance)
+    found = fitter.fit([Term.of({**creep, "time_constant": 6e-3})])
+    assert ("time_constant" in told(fitter, found)[0].bound) is at_bound
