@@ -169,8 +169,7 @@ class Fitter:
     def above_noise(self, model: Fitted, louder: float = 1.0, noise: float = math.inf) -> float:
         """Return that relative error (rms) above that of noise, so many times `louder`.
 
-        Where replicates leave less than white noise does, their squared error is the `noise`: counts are not
-        white where an axis is slow.
+        `noise` is the squared error of replicates: counts of a slow axis are not white, and may be less.
         """
         weight = self.balance.trust**2
         power = float(np.sum(weight * self.balance.drive_force() ** 2) / np.sum(weight))
@@ -310,13 +309,9 @@ class Fitter:
         return replace(model, terms=tuple(terms), coefficients=moved, residual=rest, weights=moved[own])
 
     def _as_it_is(self, model: Fitted) -> Fitted:
-        """Return a model with the error of its own friction: its columns were made for one much like it.
-
-        What depends on the level of friction, as friction by load, else explains by a level of its own.
-        """
+        """Return a model with the error of its own friction: its columns were made for one much like it."""
         true = self.balance.error(model.entries, model.coefficients, model.weights)
-        sse = float(np.sum(true[self.rows] ** 2))
-        worse = max(sse / max(model.sse, 1e-300), 1.0)
+        worse = max(float(np.sum(true[self.rows] ** 2)) / max(model.sse, 1e-300), 1.0)
         return replace(model, residual=true, sse=worse * model.sse, errors=worse * model.errors)
 
     def jointly(self, system: System, prior: Prior, more: Floats) -> tuple[Grams, Prior]:
