@@ -174,8 +174,9 @@ class Fitter:
         weight = self.balance.trust**2
         power = float(np.sum(weight * self.balance.drive_force() ** 2) / np.sum(weight))
         white, left = self.balance.noise_power / max(power, 1e-300), self.relative(model) ** 2
-        told = left * noise / max(float(model.errors.sum()), 1e-300)
-        return float(np.sqrt(max(left - louder**2 * min(white, told), 0.0)))
+        if Noise.stated(self.balance.stage) > 0.0:  # else replicates are read by a sensor that is guessed
+            white = min(white, left * noise / max(float(model.errors.sum()), 1e-300))
+        return float(np.sqrt(max(left - louder**2 * white, 0.0)))
 
     def numbers(self, model: Fitted, *, effects: bool) -> tuple[Floats, Floats, Floats]:
         """Return mass, damping, level and reach of friction, and sizes of believed `effects` by amount.
