@@ -96,6 +96,8 @@ class Doubt:
     """Empty where it is one."""
     left: float
     """Part that is left of what there is without it, squared and above the noise."""
+    denied: bool = False
+    """Whether it is the other objective that does not show it."""
 
 
 def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
@@ -112,7 +114,7 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
     for i, span in enumerate(told(fitter, chosen)):
         why = "its size may be nothing" if span.nothing else ""
         why = f"{', '.join(span.bound)} at its bound" if span.bound else why
-        left = 1.0
+        left, elsewhere = 1.0, False
         if not why:
             without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
             forms = _only_forms(fitter, chosen, i)
@@ -126,9 +128,10 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
                 errors = errors_beside(fitter, chosen, forms)
                 other = rival(fitter, without, errors, size, chosen.entries[i])
                 why = STANDS_IN.format(other) if other else ""
-            if not why and denied(fitter, chosen, without):
+            elsewhere = not why and denied(fitter, chosen, without)
+            if elsewhere:
                 why = NOT_SHOWN.format("simulated positions" if fitter.by_force else "forces")
-        said.append(Doubt(why, left))
+        said.append(Doubt(why, left, elsewhere))
     return said
 
 

@@ -28,8 +28,8 @@ SET_LEVEL = 0.05
 CELLS = 10
 """Parts of a block over which models are compared: each with many rows, together many."""
 ANOTHER = 0.5
-"""Part of its gain in an effect's place that another still has beside it, from which on the two do not
-explain the same."""
+"""Another effect in the place of a chosen one has a gain. With more than this part of it left beside the
+chosen one, it explains something else."""
 NEAR = 0.5
 """Part of the best screened gain from which on a candidate is fitted in another's place."""
 DIGITS = 3
@@ -110,7 +110,7 @@ def _by_cell(fitter: Fitter, model: Fitted, at: int) -> Floats:
 
 
 def explains_another(fitter: Fitter, chosen: Fitted, rest: Fitted, other: Fitted, ends: float) -> bool:
-    """Tell whether what stands in an effect's place gains as much beside it: then it is no rival of it.
+    """Tell whether what stands in an effect's place gains much beside it too: then it is no rival.
 
     Two effects may gain alike without explaining the same rows. `rest` is the chosen model without this one.
     """

@@ -99,7 +99,8 @@ def _diagnosed(
     finish = ends - (1.0 - SEARCH) * budget
     hidden = untold(balance) > MUCH
     fitter, found = _searched(objectives, until(finish, FORCES) if hidden else finish, say, seed)
-    if hidden and Rest.of(fitter, found).significant and hides(fitter, found.chosen):
+    doubtful = hidden and (found.denied or Rest.of(fitter, found).significant)
+    if doubtful and hides(fitter, found.chosen):
         if time.monotonic() < finish:
             fitter, found = _by_trajectory(stage, fitter, finish, say, seed)
         else:

@@ -53,6 +53,8 @@ class Search:
     """What was found and not kept, and why."""
     doubted: bool = False
     """Whether the search ended because its objective was doubted."""
+    denied: bool = False
+    """Whether an effect was left out because the other objective does not show it."""
     elsewhere: bool = False
     """Whether friction is settled on another model than the chosen one."""
 
@@ -228,6 +230,7 @@ def _solid(fitter: Fitter, found: Search) -> None:
         if not weak:
             return
         at = max(weak, key=lambda i: doubted[i].left)
+        found.denied |= doubted[at].denied
         found.dropped.append(f"{ent.names(found.chosen.entries)[at]} is not named: {doubted[at].why}")
         kept = [t for i, t in enumerate(found.chosen.terms) if i != at]
         found.chosen, found.alternatives, found.beside = fitter.fit(kept, found.chosen), [], None

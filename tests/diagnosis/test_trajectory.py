@@ -298,7 +298,6 @@ def test_what_a_model_lacks_is_what_its_slopes_say() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="told as other values since friction by load is fitted anew", strict=False)
 def test_friction_that_grows_with_the_load_is_named(loaded: list[Recording]) -> None:
     done = diagnose(stage(), loaded, budget=200.0)
     assert done.verdict == "missing-physics"
