@@ -50,7 +50,7 @@ def system_around(
         change = scale * (left - balance.left(entries, around, weights, larger)[1]) / MORE
         columns[balance.friction] += np.outer(each / (each @ weights), change)
         y = y + change
-    return _bounded(System(y, columns, system.of_entry, scale))
+    return _bounded(System(y, columns, system.of_entry))
 
 
 def tangents_of(

@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.bank import AS_IT_IS
 from rtcomp.diagnosis.blocks import cut
 from rtcomp.diagnosis.cache import KEPT_ONCE, Cache, Group, key_of
 from rtcomp.diagnosis.data import Data, Segment
@@ -31,9 +32,6 @@ from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place
 from rtcomp.stage.balance import around_rows, forces, parts_of_drive
 from rtcomp.stage.stage import Stage
-
-PLAIN = (1.0, 1.0)
-"""Times its stiffness and its level, where the whole of friction is as it is."""
 
 
 class ForceBalance(Signals):
@@ -147,7 +145,7 @@ class ForceBalance(Signals):
             at += len(found)
         columns = np.concatenate(rows)
         scale = self._scale(y, by_load)
-        return System(scale * y, scale * columns if scale != 1.0 else columns, tuple(spans), scale)
+        return System(scale * y, scale * columns if scale != 1.0 else columns, tuple(spans))
 
     def error(self, entries: Sequence[Entry], c: Floats, weights: Floats | None = None) -> Floats:
         """Return ``y - A c`` (n,) of `system` for given coefficients, filtered as one signal: far cheaper."""
@@ -159,7 +157,7 @@ class ForceBalance(Signals):
         entries: Sequence[Entry],
         c: Floats,
         weights: Floats | None = None,
-        larger: tuple[float, float] = PLAIN,
+        larger: tuple[float, float] = AS_IT_IS,
     ) -> tuple[float, Floats]:
         """Return the scale of that error, and the error (n,) without it.
 
@@ -214,7 +212,7 @@ class ForceBalance(Signals):
         return float(np.sqrt(max(whole / left, 1.0)))
 
     def _groups(
-        self, entries: Sequence[Entry], weights: Floats | None, larger: tuple[float, float] = PLAIN
+        self, entries: Sequence[Entry], weights: Floats | None, larger: tuple[float, float] = AS_IT_IS
     ) -> tuple[Group, list[Group], list[list[Group]], Group | None]:
         """Return the drive side, the columns of base and of each entry, the friction that loads make."""
         everything, adding, work = self.at_work(entries)

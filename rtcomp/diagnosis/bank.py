@@ -34,6 +34,8 @@ from rtcomp.physics.wires import (
 from rtcomp.stage.balance import along_row, around_rows, parts_of
 from rtcomp.stage.stage import Stage
 
+AS_IT_IS = (1.0, 1.0)
+"""Times its stiffness and its level, for what asks for the whole of friction."""
 SPEED_UNITS = 3
 """Units before the stop elements: viscous friction, micro-damping, its derivative."""
 FASTER = 0.02
@@ -53,7 +55,7 @@ def units_along(
     start: Floats | None = None,
     least_parts: int = 1,
     sizes: Floats | None = None,
-    larger: tuple[float, float] = (1.0, 1.0),
+    larger: tuple[float, float] = AS_IT_IS,
 ) -> Floats:
     """Return the force (N) of each unit around the rows of a motion, (K, 3 + reaches).
 

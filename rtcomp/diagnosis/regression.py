@@ -22,8 +22,6 @@ class System:
     y: Floats
     columns: Floats
     of_entry: tuple[slice, ...]
-    scale: float = 1.0
-    """By which y and columns were made larger, for what the residual depends less on the command."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.bank import SPEED_UNITS, deflections, units_along
+from rtcomp.diagnosis.bank import AS_IT_IS, SPEED_UNITS, deflections, units_along
 from rtcomp.diagnosis.cache import Cache, Group, key_of
 from rtcomp.diagnosis.data import Data, Segment, behind_reading
 from rtcomp.diagnosis.entries import Entry
@@ -272,7 +272,7 @@ class Signals:
         weights: Floats | None,
         some: np.ndarray | None = None,
         times: Floats | None = None,
-        larger: tuple[float, float] = (1.0, 1.0),
+        larger: tuple[float, float] = AS_IT_IS,
     ) -> Floats:
         """Return the force (N, (K, p)) around the rows of damping and of friction units, all or `some`.
 
