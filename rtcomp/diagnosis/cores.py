@@ -15,6 +15,8 @@ from typing import TypeVar
 
 from numba import config
 
+from rtcomp.interrupts import signals_wait
+
 Item = TypeVar("Item")
 Found = TypeVar("Found")
 
@@ -70,14 +72,16 @@ def shared(
             helpers.idle.release()
 
     at_work: list[Future[None]] = []
-    while len(at_work) < len(all_items) - 1 and helpers.idle.acquire(blocking=False):
-        at_work.append(helpers.pool.submit(help_out))
+    with signals_wait():
+        while len(at_work) < len(all_items) - 1 and helpers.idle.acquire(blocking=False):
+            at_work.append(helpers.pool.submit(help_out))
     try:
         work(done)
     finally:
-        leave_the_rest()  # an interrupt or `done` may have ended the caller's part
-        for helper in at_work:
-            helper.result()
+        with signals_wait():
+            leave_the_rest()  # an interrupt or `done` may have ended the caller's part
+            for helper in at_work:
+                helper.result()
     if failed:
         raise failed[min(failed)]
     return [found[at] for at in range(len(all_items))]

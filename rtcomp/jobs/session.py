@@ -29,6 +29,7 @@ from rtcomp.hysteresis.learner import Learner
 from rtcomp.hysteresis.lms import Lms
 from rtcomp.hysteresis.model import HysteresisModel
 from rtcomp.hysteresis.rls import Rls
+from rtcomp.interrupts import stop_on_signals
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.plan import ReferencePlan, VoltagePlan
 from rtcomp.jobs.tick_settings import check_size, tick_settings
@@ -37,7 +38,7 @@ from rtcomp.loop.clock import VirtualClock, WallClock
 from rtcomp.loop.device import Device
 from rtcomp.loop.realtime import PRIORITY, in_force, realtime_process
 from rtcomp.loop.ring import Ring
-from rtcomp.loop.run import Outcome, run, stop_on_signals
+from rtcomp.loop.run import Outcome, run
 from rtcomp.loop.stop_watch import stop_watch
 from rtcomp.loop.tick import COLUMNS, Tick
 from rtcomp.recording.reader import Recording

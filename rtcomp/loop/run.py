@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from types import FrameType
 from typing import Protocol
 
 import numpy as np
 
 from rtcomp.errors import DeviceError, EmergencyStopError, LimitError, RtcompError
+from rtcomp.interrupts import Stop
 from rtcomp.kernels import Floats
 from rtcomp.loop import layout as at
 from rtcomp.loop.bound import BoundTick
@@ -62,40 +61,6 @@ class Outcome:
     """Samples that called themselves new and were not."""
     taken_back: int = 0
     """Times that learning had spoiled the weights, and those kept were taken."""
-
-
-class Stop:
-    """Set by a signal; looked at once a tick."""
-
-    def __init__(self) -> None:
-        self.requested = False
-        self.number: int = signal.SIGINT
-        """The signal that asked first."""
-
-
-@contextlib.contextmanager
-def stop_on_signals() -> Iterator[Stop]:
-    """Turn SIGINT and SIGTERM into a request to stop at the next tick.
-
-    A second one changes nothing: it cannot cut the zeroing short.
-    """
-    stop = Stop()
-
-    def ask(number: int, _frame: FrameType | None) -> None:
-        if not stop.requested:
-            stop.number = number
-            stop.requested = True
-
-    before = {}
-    for number in (signal.SIGINT, signal.SIGTERM):
-        # Signals can be handled in the main thread only; elsewhere the caller sets `requested`.
-        with contextlib.suppress(ValueError):
-            before[number] = signal.signal(number, ask)
-    try:
-        yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _lose(tick: Tick, ring: Ring, first: int, references: Floats) -> None:

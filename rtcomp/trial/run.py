@@ -9,10 +9,15 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
+
+from rtcomp.interrupts import Stop
+
+LOOK_S = 0.1
+"""How often it is looked whether a signal came, while tasks run."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +47,14 @@ class Outcome:
 
 
 class Processes:
-    """Runs tasks with `jobs` workers; leaving the ``with`` block ends everything that still runs."""
+    """Runs tasks with `jobs` workers; leaving the ``with`` block ends everything that still runs.
 
-    def __init__(self, jobs: int) -> None:
+    A signal that ends the run is handed on by `stop`, between tasks or within LOOK_S.
+    """
+
+    def __init__(self, jobs: int, stop: Stop) -> None:
         self.jobs = jobs
+        self._stop = stop
         self._live: set[subprocess.Popen[bytes]] = set()
         self._lock = threading.Lock()
         self._closed = False
@@ -73,9 +82,13 @@ class Processes:
         pool = ThreadPoolExecutor(self.jobs)
         try:
             futures = {pool.submit(self._one, task): task for task in tasks}
-            for future in as_completed(futures):
-                if each is not None:
-                    each(future.result())
+            left = set(futures)
+            while left:
+                ended, left = wait(left, LOOK_S, FIRST_COMPLETED)
+                for future in ended:
+                    if each is not None:
+                        each(future.result())
+                self._stop.hand_on()
             outcomes = {future.result().name: future.result() for future in futures}
         finally:
             with self._lock:

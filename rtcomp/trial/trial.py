@@ -20,6 +20,7 @@ import numpy as np
 
 from rtcomp import __version__
 from rtcomp.errors import RtcompError
+from rtcomp.interrupts import Stop, signals_wait
 from rtcomp.trial.calibration import calibration
 from rtcomp.trial.draw import Case, Plan, draw, plan
 from rtcomp.trial.figures import Figure, Seen, figures, seen
@@ -125,15 +126,16 @@ def trial(
     started = time.perf_counter()
     so_far = Stopped.read(earlier) if earlier else _nothing_yet(settings)
     before = so_far.seconds
-    try:
-        sealed = _sealed(settings, out, progress, so_far, earlier)
-        with Processes(settings.jobs) as processes:
-            done = _through(settings, processes, out, progress, sealed, so_far)
-    except BaseException:
-        # No diagnosis runs any more: only now may salts lie on a disk.
-        so_far.seconds = before + time.perf_counter() - started
-        so_far.write(out)
-        raise
+    with signals_wait() as stop:
+        try:
+            sealed = _sealed(settings, out, progress, so_far, earlier, stop)
+            with Processes(settings.jobs, stop) as processes:
+                done = _through(settings, processes, out, progress, sealed, so_far, stop)
+        except BaseException:
+            # No diagnosis runs any more: only now may salts lie on a disk.
+            so_far.seconds = before + time.perf_counter() - started
+            so_far.write(out)
+            raise
     if earlier is not None:
         done.notes.insert(0, f"gone on with after it was stopped at {before:.0f} s")
     done = replace(done, seconds=before + time.perf_counter() - started)
@@ -152,14 +154,13 @@ def _nothing_yet(settings: Settings) -> Stopped:
 
 
 def _sealed(
-    settings: Settings, out: Path, progress: Progress, so_far: Stopped, earlier: Path | None
+    settings: Settings, out: Path, progress: Progress, so_far: Stopped, earlier: Path | None, stop: Stop
 ) -> Sealed:
     """Draw all cases, write what the diagnoses get, and commit to the answers (or check them, if gone on)."""
     if earlier is not None:  # first of all: who stops it again finds here what was found there
         so_far.bring(earlier, out)
     plans = plan(settings.cases, settings.seed, settings.only, settings.families, settings.forms)
     answers, so_far.not_drawn = {}, {}
-    # Threads: a signal that comes while a process is forked is lost there, or leaves a pool that never ends.
     pool = ThreadPoolExecutor(settings.jobs)
     try:
         for chosen, made in zip(plans, pool.map(_make, plans, [out] * len(plans)), strict=True):
@@ -168,6 +169,7 @@ def _sealed(
             else:
                 so_far.not_drawn[chosen.name] = made
             progress("draw", len(answers) + len(so_far.not_drawn), len(plans))
+            stop.hand_on()
     finally:
         pool.shutdown(cancel_futures=True)  # who stops it waits for the cases at hand, not for all
     if not answers:
@@ -182,7 +184,13 @@ def _sealed(
 
 
 def _through(
-    settings: Settings, processes: Processes, out: Path, progress: Progress, sealed: Sealed, so_far: Stopped
+    settings: Settings,
+    processes: Processes,
+    out: Path,
+    progress: Progress,
+    sealed: Sealed,
+    so_far: Stopped,
+    stop: Stop,
 ) -> Trial:
     """Diagnose what is left, open the answers and score."""
     names = list(sealed.salts)
@@ -208,7 +216,7 @@ def _through(
         raise RuntimeError("a diagnosis still runs; the seal stays closed")
     answers = sealed.open(out / "answers.json", out / "commitments.json")
     cases = [Case.again(answers[name]) for name in names]
-    errors = _judge(settings, processes, out, cases, ended[DIAGNOSES], progress)
+    errors = _judge(settings, processes, out, cases, ended[DIAGNOSES], progress, stop)
     rows = _scored(cases, ended[DIAGNOSES], out / DIAGNOSES, errors)
     rivals = {r: figures(_scored(cases, ended[r], out / r, {}), gains=False) for r in chosen}
     notes += [f"{r.case.plan.name}: {r.fault}" for r in rows if r.fault]
@@ -280,6 +288,7 @@ def _judge(
     cases: Iterable[Case],
     said: Mapping[str, Outcome],
     progress: Progress,
+    stop: Stop,
 ) -> dict[str, Errors]:
     """Make the unseen recordings and replay believed, diagnosed and exact stages on them."""
     tasks: dict[str, Task] = {}
@@ -299,6 +308,7 @@ def _judge(
             command = [*settings.replay, str(folder / f"{recording}.csv.gz"), "--stage", str(stage)]
             tasks[key] = Task(key, (*command, "--out", str(result)), into / f"{which}.log", REPLAY_S)
         progress("unseen", n + 1, len(judged))
+        stop.hand_on()
     ended = processes.run(list(tasks.values()), _count(progress, "replay", len(tasks)))
     well = {o.name for o in ended if o.well}
     errors = {}

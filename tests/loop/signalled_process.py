@@ -10,8 +10,8 @@ import time
 
 from loop_rig import device, go, plan, stage, tick
 
+from rtcomp.interrupts import stop_on_signals
 from rtcomp.loop.clock import WallClock
-from rtcomp.loop.run import stop_on_signals
 
 
 def main() -> None:

@@ -16,10 +16,10 @@ import pytest
 from loop_rig import AT, MASS, TICKS, VISCOUS, device, ended_safely, go, plan, replaced, stage, tick
 
 from rtcomp.errors import DeviceError, LimitError
+from rtcomp.interrupts import Stop
 from rtcomp.loop import run as run_module
 from rtcomp.loop.device import Device, EndOfRun
 from rtcomp.loop.ring import CLOSED
-from rtcomp.loop.run import Stop
 
 
 def test_the_rig_is_a_device():

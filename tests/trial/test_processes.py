@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from rtcomp.interrupts import Stop
 from rtcomp.trial.run import Processes, Task
 
 
@@ -27,7 +28,7 @@ def gone(pid: int) -> bool:
 
 
 def test_outcomes_come_in_order_with_status_and_last_words(tmp_path: Path) -> None:
-    with Processes(2) as processes:
+    with Processes(2, Stop()) as processes:
         slow, bad = processes.run(
             [
                 task("slow", "import time; time.sleep(0.5); print('done')", tmp_path),
@@ -40,7 +41,7 @@ def test_outcomes_come_in_order_with_status_and_last_words(tmp_path: Path) -> No
 
 
 def test_a_program_that_does_not_exist_is_a_finding(tmp_path: Path) -> None:
-    with Processes(1) as processes:
+    with Processes(1, Stop()) as processes:
         (outcome,) = processes.run([Task("none", ("/no/such/program",), tmp_path / "log", 5.0)])
     assert outcome.status == 127 and "no such file" in outcome.words.lower()
 
@@ -56,7 +57,7 @@ FAMILY = (
 def test_what_a_diagnosis_started_ends_with_it(seconds: float, tmp_path: Path) -> None:
     pids = tmp_path / "pids"
     code = FAMILY.format(path=str(pids), seconds=seconds)
-    with Processes(1) as processes:
+    with Processes(1, Stop()) as processes:
         (outcome,) = processes.run([task("family", code, tmp_path, 3.0)])
     assert outcome.timed_out == (seconds > 0.0)
     assert_gone(pids)
@@ -66,7 +67,7 @@ def test_diagnoses_side_by_side_share_the_cores(tmp_path: Path) -> None:
     code = "import os; print(os.environ['NUMBA_NUM_THREADS'], os.environ['OMP_NUM_THREADS'])"
     cores = os.cpu_count() or 1
     for jobs in (1, cores, 2 * cores):
-        with Processes(jobs) as processes:
+        with Processes(jobs, Stop()) as processes:
             (said,) = processes.run([task("says", code, tmp_path)])
         share = max(1, cores // jobs)
         assert said.words == f"{share} {share}"
@@ -85,7 +86,7 @@ def test_an_error_while_they_run_ends_them_all(tmp_path: Path) -> None:
         raise KeyboardInterrupt
 
     before = threading.active_count()
-    with pytest.raises(KeyboardInterrupt), Processes(2) as processes:
+    with pytest.raises(KeyboardInterrupt), Processes(2, Stop()) as processes:
         processes.run(tasks, stop)
     assert_gone(pids)
     assert threading.active_count() == before
