@@ -52,6 +52,20 @@ def for_axis(unit: str, axis: str) -> str:
     return _ROTARY.get(unit, unit) if axis == "rotary" else unit
 
 
+def power_of(base: str, unit: str) -> int:
+    """Return the power of `base` (``"m"``, ``"N"`` or ``"s"``) in a unit such as ``"N s/m"``.
+
+    A kilogram is a N s^2/m.
+    """
+    above, _, below = unit.replace("kg", "N s^2/m").partition("/")
+    found = 0
+    for part, sign in ((above, 1), (below, -1)):
+        for factor in part.split():
+            name, _, power = factor.partition("^")
+            found += sign * int(power or 1) * (name == base)
+    return found
+
+
 _PREFIXES = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M"}
 
 

@@ -18,13 +18,14 @@ from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.intervals import Told, believed_sizes, numbers, told
 from rtcomp.diagnosis.locate import locate
+from rtcomp.diagnosis.one_cause import LENGTH, Cause, fixed_units, force_constant, one_cause
 from rtcomp.diagnosis.other_forms import in_any_form
 from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
-from rtcomp.diagnosis.retuned import Numbers, all_by_one_factor, force_constant, retunings
+from rtcomp.diagnosis.retuned import Numbers, retunings
 from rtcomp.diagnosis.selection import Search
 from rtcomp.diagnosis.settings import LEAST_GAIN, LEVEL, TOLERANCE
 from rtcomp.diagnosis.significance import log_gain
-from rtcomp.diagnosis.stage_of import with_forces
+from rtcomp.diagnosis.stage_of import in_units, with_effect
 from rtcomp.diagnosis.unbiased import unbiased
 from rtcomp.diagnosis.validation import Reserved
 from rtcomp.diagnosis.where import Compared, curves
@@ -78,13 +79,15 @@ def answer(
     named = _named(fitter, chosen, spans, sets, shares, rest)
     final = chosen if named else base
     view = Compared(balance)
+    cause = None if named or rest.significant else _cause(fitter, believed, base)
     before, after = fitter.force(base), fitter.force(final)
     if rest.significant or (chosen.terms and not named):
         left = locate(view, after, None, seed, believed.axis)
         part = rest.share if named else 1.0
         named.append(Named(UNEXPLAINED, 1.0, {}, part, curve=left_over(left)))
-    tuned = numbers(fitter, believed, final)
-    stages, moved = _stages(believed, fitter, base, final, tuned, bool(named))
+    stages, moved = _stages(believed, fitter, base, final, cause)
+    if cause is not None and cause.unit == LENGTH:
+        named.append(_other_scale(fitter, believed, stages["retuned"], cause))
     verdict, matters = _verdict(named, fitter, believed, stages["retuned"], moved)
     if not matters:
         stages["after"] = stages["retuned"] = believed
@@ -162,22 +165,41 @@ def _named(
     return sorted(found, key=lambda e: -e.share)
 
 
-def _stages(
-    believed: Stage, fitter: Fitter, base: Fitted, final: Fitted, tuned: Numbers, named: bool
-) -> tuple[dict[str, Stage], list[Retuned]]:
-    """Return the retuned and the extended stage, and the numbers of the belief that moved."""
-    stages = {"retuned": fitter.stage(base), "after": fitter.stage(final)}
-    moved = retunings(tuned, believed.axis)
-    # Forces whose size is no number of the model cannot have moved with the others.
-    fixed = any(
-        ent.adds_force(ent.kind_of(e)) and not ent.kind_of(e).linear for e in believed.mechanics.effects
+def _cause(fitter: Fitter, believed: Stage, base: Fitted) -> Cause | None:
+    """Return the one unit behind all numbers of the belief that moved, if they matter and it is likelier."""
+    if not _matters(fitter, believed, fitter.stage(base)):
+        return None
+    return one_cause(numbers(fitter, believed, base, effects=True), fixed_units(believed))
+
+
+def _other_scale(fitter: Fitter, believed: Stage, retuned: Stage, cause: Cause) -> Named:
+    """Return the scale of the sensor that does what numbers of a retuned stage do together."""
+    left, first = (float(np.mean(fitter.left_by(one)[fitter.rows] ** 2)) for one in (retuned, believed))
+    entry = ent.with_other_unit(cause.unit, cause.factor)
+    values = {key: Value(cause.factor, cause.low, cause.high, "1") for key in entry if key != "name"}
+    return Named(
+        (str(entry["name"]),), cause.probability, values, float(np.clip(1.0 - left / first, 0.0, 1.0))
     )
-    factor = None if named or fixed else all_by_one_factor(numbers(fitter, believed, final, effects=True))
-    if factor is not None:
-        stages = {name: with_forces(stage, 1.0 / factor[0]) for name, stage in stages.items()}
-        moved = [force_constant(believed, *factor)]
-    else:
-        moved += believed_sizes(fitter, final)
+
+
+def _stages(
+    believed: Stage, fitter: Fitter, base: Fitted, final: Fitted, cause: Cause | None
+) -> tuple[dict[str, Stage], list[Retuned]]:
+    """Return the retuned and the extended stage, and the numbers of the belief that moved.
+
+    In the units of the `cause`, if all moved by one.
+    """
+    stages = {"retuned": fitter.stage(base), "after": fitter.stage(final)}
+    tuned, moved = numbers(fitter, believed, final), believed_sizes(fitter, final)
+    if cause is not None:
+        tuned, moved = tuned.in_units(cause.unit, cause.factor), []
+        changed = {name: in_units(stage, cause.unit, cause.factor) for name, stage in stages.items()}
+        if cause.unit == LENGTH:
+            entry = ent.with_other_unit(cause.unit, cause.factor)
+            stages["after"] = with_effect(changed["after"], entry)
+        else:
+            stages, moved = changed, [force_constant(believed, cause)]
+    moved = [*retunings(tuned, believed.axis), *moved]
     return stages, moved + _found(fitter.balance, believed, tuned)
 
 
@@ -197,18 +219,23 @@ def _found(balance: ForceBalance, believed: Stage, tuned: Numbers) -> list[Retun
     return found
 
 
+def _matters(fitter: Fitter, believed: Stage, retuned: Stage) -> bool:
+    """Tell whether other numbers of the belief bring down an error that is not small already."""
+    before, after = (fitter.left_by(stage) ** 2 for stage in (believed, retuned))
+    relative = float(np.sqrt(np.mean(before[fitter.rows])))
+    # By block, as every gain: what better numbers gain in one of them they must not lose in the others.
+    sums = [np.bincount(fitter.block, each, fitter.blocks)[fitter.use] for each in (before, after)]
+    better = log_gain(*(np.maximum(each, 1e-300) for each in sums)) > -2.0 * math.log1p(-LEAST_GAIN)
+    return better and relative > TOLERANCE
+
+
 def _verdict(
     named: Sequence[Named], fitter: Fitter, believed: Stage, retuned: Stage, moved: Sequence[Retuned]
 ) -> tuple[Verdict, bool]:
     """Return the verdict, and whether other numbers than the believed ones are given."""
     if any(e.names != UNEXPLAINED for e in named):
         return "missing-physics", True
-    before, after = (fitter.left_by(stage) ** 2 for stage in (believed, retuned))
-    relative = float(np.sqrt(np.mean(before[fitter.rows])))
-    # By block, as every gain: what better numbers gain in one of them they must not lose in the others.
-    sums = [np.bincount(fitter.block, each, fitter.blocks)[fitter.use] for each in (before, after)]
-    better = log_gain(*(np.maximum(each, 1e-300) for each in sums)) > -2.0 * math.log1p(-LEAST_GAIN)
-    matters = bool(moved) and better and relative > TOLERANCE
+    matters = bool(moved) and _matters(fitter, believed, retuned)
     if named:
         # Numbers bent to an unknown cause may do worse on other motion; friction where none was, not.
         return "unexplained", matters and believed.friction is None

@@ -208,6 +208,18 @@ def sizes_of(entry: Mapping[str, Any]) -> Floats:
     return np.array(found)
 
 
+def units_of(entry: Mapping[str, Any]) -> list[str]:
+    """Return the unit of each of these sizes."""
+    kind = kind_of(entry)
+    return [parameter(kind, name).unit for name, quarters in _sized(entry) for _ in quarters or (0.0,)]
+
+
+def with_other_unit(unit: str, size: float) -> Entry:
+    """Return the entry that puts another unit, true over believed of this `size`, in the place of a unit."""
+    kind = next(kind for kind in catalogue.entries() if kind.other_unit == unit)
+    return {"name": kind.name, kind.parameters[0].name: size}
+
+
 def bounds_of(entry: Mapping[str, Any]) -> tuple[Floats, Floats]:
     """Return the lowest and highest size of each of the `basis`."""
     kind = kind_of(entry)

@@ -1,9 +1,9 @@
-"""Numbers of the belief that moved: which are told, how surely, and whether all moved by one factor."""
+"""Numbers of the belief that moved: which are told, and how surely."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,12 +11,10 @@ from rtcomp.diagnosis.result import Retuned, Value
 from rtcomp.kernels import Floats
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.stage.stage import Stage
-from rtcomp.units import for_axis
+from rtcomp.units import for_axis, power_of
 
 MOVED = 0.02
 """Relative change of a parameter that is worth reporting."""
-SEVERAL = 3
-"""Numbers that must have moved for it to be said that all did."""
 FREEDOM, WIDE = 9, 2.262
 """Degrees of freedom of about ten blocks, and standard deviations of a 95 % interval from them (Student)."""
 
@@ -32,6 +30,13 @@ class Numbers:
     values: Floats
     half: Floats
     """Half widths of plain 95 % intervals."""
+    units: tuple[str, ...] = ("kg", "N s/m", "N s/m", "N", "m")
+    """As a linear axis has them."""
+
+    def in_units(self, unit: str, factor: float) -> Numbers:
+        """Return them with those found in another `unit`, times `factor` for each in their unit."""
+        times = factor ** np.array([power_of(unit, of) for of in self.units], dtype=float)
+        return replace(self, values=times * self.values, half=times * self.half)
 
 
 def retunings(numbers: Numbers, axis: str) -> list[Retuned]:
@@ -43,7 +48,6 @@ def retunings(numbers: Numbers, axis: str) -> list[Retuned]:
     """
     before, values, half = numbers.before, numbers.values, numbers.half
     names = ("mass", "viscous", "micro_damping", "friction.level", "friction.reach")
-    units = ("kg", "N s/m", "N s/m", "N", "m")
     moved = np.abs(values - before)
     tell = (before > 0) & (moved > MOVED * before)
     clear = np.where(tell, moved / np.maximum(half, 1e-300), 0.0)
@@ -51,36 +55,9 @@ def retunings(numbers: Numbers, axis: str) -> list[Retuned]:
     found = []
     for i in np.flatnonzero(clear > wider).tolist():
         new, size = float(values[i]), float(wider * half[i])
-        value = Value(new, max(new - size, 0.0), new + size, for_axis(units[i], axis))
+        value = Value(new, max(new - size, 0.0), new + size, for_axis(numbers.units[i], axis))
         found.append(Retuned(names[i], float(before[i]), value))
     return found
-
-
-def all_by_one_factor(numbers: Numbers) -> tuple[float, float] | None:
-    """Return the factor by which all forces moved, and the half width of its interval, if they agree.
-
-    No recording of voltage and position tells such numbers from another force constant, which is one number
-    and not four.
-    """
-    forces = np.flatnonzero(np.arange(numbers.before.size) != 4)  # a reach is no force
-    some = numbers.before[forces] > 0
-    before = numbers.before[forces][some]
-    ratio, half = numbers.values[forces][some] / before, numbers.half[forces][some] / before
-    open_by = np.maximum(half, 1e-9)
-    factor = float(np.average(ratio, weights=open_by**-2.0))
-    size = float(np.sqrt(1.0 / np.sum(open_by**-2.0)))
-    clear = np.count_nonzero(np.abs(ratio - 1.0) > half)
-    apart = np.abs(ratio - factor) > open_by
-    if clear < SEVERAL or apart.any() or abs(factor - 1.0) < max(MOVED, size):
-        return None
-    return factor, size
-
-
-def force_constant(believed: Stage, factor: float, half: float) -> Retuned:
-    """Return another force constant in the place of forces that all moved by `factor` (+- `half`)."""
-    was = believed.force_constant
-    value = Value(was / factor, was / (factor + half), was / (factor - half), for_axis("N/V", believed.axis))
-    return Retuned("force_constant", was, value)
 
 
 def widening(clear: Floats, family: int) -> float:

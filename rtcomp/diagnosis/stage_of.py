@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,16 @@ from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import catalogue
 from rtcomp.stage.stage import Stage
+from rtcomp.units import power_of
 
+UNITS = {
+    "mass": "kg",
+    "force_constant": "N/V",
+    "viscous": "N s/m",
+    "micro_damping": "N s/m",
+    "micro_damping_speed": "m/s",
+}
+"""Numbers of the stage file's section ``stage`` that have a force or a length in their unit."""
 SLIGHT = 1e-6
 """Part of the largest yield force below which a friction unit is left out."""
 
@@ -65,22 +74,38 @@ def stage_of(balance: ForceBalance, fitted: Fitted, *, between: bool = False) ->
         raise ConfigError(f"a fit ran away: it has numbers that no stage may have ({error})") from error
 
 
-def with_forces(stage: Stage, factor: float) -> Stage:
-    """Return a stage that moves as `stage` does, all its forces and the drive's times `factor`."""
+def in_units(stage: Stage, unit: str, factor: float) -> Stage:
+    """Return `stage` in another `unit`, ``"N"`` or ``"m"``: numbers times `factor` for each that they have.
+
+    For a command it moves as it did where force is another; where length is, `factor` times as far.
+    """
     m = stage.mechanics
     changes: dict[str, Any] = {
-        key: factor * getattr(m, key) for key in ("mass", "force_constant", "viscous", "micro_damping")
+        key: factor ** power_of(unit, of) * getattr(m, key) for key, of in UNITS.items()
     }
     if isinstance(m.friction, list):
-        changes["friction"] = [{"stiffness": factor * e.stiffness, "reach": e.reach} for e in m.friction]
+        stiffness, reach = (factor ** power_of(unit, of) for of in ("N/m", "m"))
+        changes["friction"] = [
+            {"stiffness": stiffness * e.stiffness, "reach": reach * e.reach} for e in m.friction
+        ]
     changed = stage.with_changes(stage=changes).to_dict()
     effects = [dict(e) for e in changed["stage"].get("effects", [])]
     if effects:
-        changed["stage"]["effects"] = [
-            ent.composed(e, factor * ent.sizes_of(e)) if ent.adds_force(ent.kind_of(e)) else e
-            for e in effects
-        ]
+        changed["stage"]["effects"] = [_in_units(e, unit, factor) for e in effects]
     return Stage.from_dict(changed)
+
+
+def with_effect(stage: Stage, entry: Mapping[str, Any]) -> Stage:
+    """Return a stage with one effect more."""
+    effects = [*(dict(e) for e in stage.to_dict()["stage"].get("effects", [])), dict(entry)]
+    return stage.with_changes(stage={"effects": effects})
+
+
+def _in_units(entry: dict[str, Any], unit: str, factor: float) -> dict[str, Any]:
+    if not ent.adds_force(ent.kind_of(entry)):
+        return entry
+    powers = np.array([power_of(unit, of) for of in ent.units_of(entry)], dtype=float)
+    return ent.composed(entry, factor**powers * ent.sizes_of(entry))
 
 
 def bias_entry(force: float) -> Entry:

@@ -40,7 +40,7 @@ by MOVED only, speed by VELOCITY less LATE, its level by REACH, its size by SCAL
 
 What a search for a missing effect needs to know stands here too, and nowhere by name: `linear` parameters,
 `neutral` values, `searchable`, `search_grid`, `whole_friction`, `moving_mass`, `behind`, `steady`,
-`command_only`, `bias`, `stands_for`,
+`command_only`, `bias`, `stands_for`, `other_unit`,
 `Parameter.physical_low` and `Parameter.held`. Each has its sentence at `Effect`; the defaults do for most.
 
 To feed an effect forward, there are two ways, and its place says which:
@@ -188,6 +188,9 @@ class Effect:
     stands_for: ClassVar[str] = ""
     """Key of the stage file's section ``stage`` that it is another way to write, "" for none: a fit moves
     that number instead."""
+    other_unit: ClassVar[str] = ""
+    """Unit of the stage in whose place it puts another, so that all numbers that have it move; "" for none.
+    Its one parameter is the true over the believed unit."""
     inverse: ClassVar[Kernel | None] = None
     """Undoes the effect on the signal that it passes on (see above); None where it cannot or need not."""
     element: ClassVar[Sequence[Parameter]] = ()

@@ -117,6 +117,7 @@ class SensorScale(Effect):
     example = {"scale": 1.01}
     neutral = {"scale": 1.0}
     linear = ("scale",)
+    other_unit = "m"
     order = 20
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from recorded import run, there_and_back
@@ -16,7 +14,7 @@ from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.intervals import numbers as numbers_of
 from rtcomp.diagnosis.pipeline import diagnose
-from rtcomp.diagnosis.retuned import Numbers, all_by_one_factor, force_constant, retunings, widening
+from rtcomp.diagnosis.retuned import retunings, widening
 from rtcomp.diagnosis.spread import elsewhere, scatter
 
 
@@ -63,44 +61,6 @@ def test_numbers_told_because_they_moved_have_wider_intervals() -> None:
     one, two = widening(np.array([9.0, 0, 0, 0, 0]), 5), widening(np.array([9.0, 9.0, 0, 0, 0]), 5)
     assert 1.1 < two < one < 1.6
     assert widening(np.array([1.1, 0, 0, 0, 0]), 5) == np.inf  # too little to be told
-
-
-def numbers(*moved: float, half: float = 0.01) -> Numbers:
-    """Numbers of 1 that moved to these; half widths of their intervals."""
-    values = np.array([*moved, 1.0])
-    return Numbers(np.ones(5), values, np.full(5, half))
-
-
-@pytest.mark.parametrize(
-    ("told", "factor"),
-    [
-        (numbers(1.1, 1.1, 1.1, 1.1), 1.1),
-        (numbers(0.93, 0.94, 0.93, 0.935), 0.934),
-        (numbers(1.1, 1.1, 1.1, 1.0), None),  # friction's level is as believed
-        (numbers(1.1, 1.04, 1.1, 1.1), None),
-        (numbers(1.1, 1.1, 1.0, 1.1, half=0.2), None),  # nothing is known
-        (numbers(1.01, 1.01, 1.01, 1.01, half=0.001), None),  # a hundredth is no news
-    ],
-)
-def test_forces_that_all_moved_by_one_factor_are_another_force_constant(
-    told: Numbers, factor: float | None
-) -> None:
-    found = all_by_one_factor(told)
-    if factor is None:
-        assert found is None
-        return
-    assert found is not None and found[0] == pytest.approx(factor, abs=0.003)
-    one = force_constant(axis(), *found)
-    assert one.after.value == pytest.approx(one.before / factor, rel=0.003)
-    assert one.after.low < one.after.value < one.after.high
-
-
-def test_a_number_that_is_not_believed_says_nothing_of_the_others() -> None:
-    some = numbers(1.1, 0.0, 0.0, 1.1)
-    zero = np.array([1.0, 0.0, 0.0, 1.0, 1.0])
-    assert all_by_one_factor(replace(some, before=zero)) is None  # two are too few
-    three = replace(numbers(1.1, 1.1, 0.0, 1.1), before=np.array([1.0, 1.0, 0.0, 1.0, 1.0]))
-    assert all_by_one_factor(three) is not None
 
 
 def test_a_mass_that_is_another_is_told_with_an_interval_that_holds_it() -> None:
