@@ -169,9 +169,7 @@ def _windows(segment: Segment, count: int, rows: int) -> list[Segment]:
     if segment.time.size <= count * rows:
         return [segment]
     starts = np.linspace(0, segment.time.size - rows, count).astype(np.int64)
-    seen = segment.source or segment
-    for jump in jumps(seen.time, seen.position)[:1]:
-        starts = _with_row(starts, int(np.searchsorted(segment.time, jump.time)), rows, segment.time.size)
+    starts = with_rows(starts, _telling(segment), rows, segment.time.size)
     earlier = np.zeros(0) if segment.before is None else segment.before
     return [
         replace(
@@ -183,22 +181,45 @@ def _windows(segment: Segment, count: int, rows: int) -> list[Segment]:
     ]
 
 
-def _with_row(starts: np.ndarray, row: int, rows: int, size: int) -> np.ndarray:
-    """Return starts (W,) of windows of so many `rows`, moved so that one compares a `row`, if one can.
+def _telling(segment: Segment) -> list[int]:
+    """Return rows that should be compared: what happens once, or at an extreme only, is seen nowhere else."""
+    seen = segment.source or segment
+    found = [int(np.searchsorted(segment.time, jump.time)) for jump in jumps(seen.time, seen.position)[:1]]
+    size = segment.time.size
+    speed = np.gradient(segment.position[:: max(1, size // BEFORE)])
+    for signal in (segment.voltage, segment.position, speed):
+        found += [int(furthest(signal)) * size // signal.size for furthest in (np.argmin, np.argmax)]
+    return found
 
-    What happens once would else be missed, where it is between them.
+
+def with_rows(starts: np.ndarray, wanted: Sequence[int], rows: int, size: int) -> np.ndarray:
+    """Return starts (W,) of windows of so many `rows`, moved to compare the `wanted` ones if they can.
+
+    The first of these come first: a window that compares one stays where it is.
     """
-    number = np.arange(starts.size)
-    first, last = number * rows, size - (starts.size - number) * rows
-    wanted = np.clip(starts, row - int(0.9 * rows), row - int(1.5 * RUN_IN * rows))
-    wanted = np.clip(wanted, first, last)
-    compares = (wanted + RUN_IN * rows * (wanted > 0) <= row) & (row < wanted + rows)
-    moved = np.where(compares, np.abs(wanted - starts), size)
-    at = int(np.argmin(moved))
-    if moved[at] == size:
-        return starts
+    pinned: set[int] = set()
+    for row in wanted:
+        first = starts + np.where(starts > 0, int(RUN_IN * rows), 0)
+        sees = np.flatnonzero((first <= row) & (row < starts + rows))
+        if sees.size:
+            pinned.add(int(sees[0]))
+            continue
+        near = np.clip(starts, row - int(0.9 * rows), row - int(1.5 * RUN_IN * rows))
+        near = np.clip(near, 0, size - rows)
+        for k in np.argsort(np.abs(near - starts)).tolist():
+            moved = _apart(starts, k, int(near[k]), rows)
+            stays = all(moved[i] == starts[i] for i in pinned)
+            if k not in pinned and stays and moved[0] >= 0 and moved[-1] <= size - rows:
+                starts = moved
+                pinned.add(k)
+                break
+    return starts
+
+
+def _apart(starts: np.ndarray, at: int, to: int, rows: int) -> np.ndarray:
+    """Return starts (W,) with one put elsewhere, and others out of its way."""
     found = starts.copy()
-    found[at] = wanted[at]
+    found[at] = to
     for k in range(at + 1, found.size):
         found[k] = max(found[k], found[k - 1] + rows)
     for k in range(at - 1, -1, -1):

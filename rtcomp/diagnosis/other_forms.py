@@ -26,8 +26,9 @@ from rtcomp.physics import Effect
 if TYPE_CHECKING:
     from rtcomp.diagnosis.fit import Fitter
 
-OTHERS = (1 / 2, 1 / 3, 2.0, 2 / 3)
-"""Periods of a wave's other harmonics, over the one that was found: the first or the second of them."""
+OTHERS = {1.0: (1 / 2, 1 / 3), 2.0: (2.0, 2 / 3)}
+"""Periods of a wave's other harmonics, over the one that was found, by the period after which it repeats: the
+one found is the first or the second of them."""
 KNOTS = 6
 """Knots over the stroke of splines that tell a smooth function of position: a wave that is there three times
 is none."""
@@ -147,11 +148,9 @@ def overtones(fitter: Fitter, model: Fitted, entry: Entry) -> Floats:
         return np.zeros((0, model.residual.size))
     still = {n: ent.neutral(kind, n) for n in kind.linear if n in entry and n != ent.AMPLITUDE}
     found = []
-    for over in OTHERS:
-        period = float(entry[ent.PERIOD]) * over
-        if 2.0 * period > high - low:
-            continue
-        made = []
+    repeated = [repeats for repeats in OTHERS if 2.0 * repeats * float(entry[ent.PERIOD]) <= high - low]
+    for over in (one for repeats in repeated for one in OTHERS[repeats]):
+        period, made = float(entry[ent.PERIOD]) * over, []
         for longer in (0.0, LONGER * period / (high - low)):
             other = {**entry, **still, ent.PERIOD: period * (1.0 + longer)}
             other.pop("form", None)

@@ -27,6 +27,8 @@ POINTS = 5
 """Start values of a nonlinear parameter."""
 PEAKS = 3
 """Peaks taken of a periodogram."""
+APART = 2.0
+"""Ratio of neighbouring voltages at most: a fit finds its way from one to the next."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ class Scales:
             (max(2.0 * balance.grain, 1e-5 * (high - low)), 0.5 * (high - low)),
             (low, high),
             speed,
-            np.unique(np.quantile(u[u > 0], quantiles)) if np.any(u > 0) else np.ones(1),
+            _filled(np.unique(np.quantile(u[u > 0], quantiles))) if np.any(u > 0) else np.ones(1),
             (data.period, data.seconds),
             (4.0 / data.seconds, min(0.4 * data.rate, balance.noise.bandwidth)),
             float(np.sqrt(np.mean(force**2))),
@@ -120,6 +122,16 @@ class Scales:
             "Hz": np.geomspace(*self.frequency, 8 * POINTS),
         }.get(unit)
         return None if found is None else _listed(found)
+
+
+def _filled(values: Floats) -> Floats:
+    """Return sorted positive values, and between those that are far apart as many more as it takes.
+
+    What a loop commands once, far above all else, leaves a gap between quantiles.
+    """
+    steps = np.ceil(np.log(values[1:] / values[:-1]) / np.log(APART)).astype(int)
+    between = [np.geomspace(a, b, n + 1)[1:-1] for a, b, n in zip(values, values[1:], steps, strict=False)]
+    return np.sort(np.concatenate([values, *between]))
 
 
 def _listed(values: Floats) -> list[float]:

@@ -16,6 +16,7 @@ from rtcomp.diagnosis.confidence import explains_another
 from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.scales import Scales
 from rtcomp.kernels import Floats
 
 WAVE = {"name": "cogging", "amplitude": 0.4, "period": 1.3e-4, "phase": 0.4}
@@ -40,6 +41,19 @@ def test_an_effect_that_changes_nothing_where_it_is_tried_first_is_tried_elsewhe
     places = fitter.balance.plain([s.position for s in fitter.balance.data.segments])
     assert places.min() > 0.5 * low
     assert "end-stop" in {c.name for c in candidates(fitter, fitter.fit([]))}
+
+
+def test_voltages_are_tried_between_what_is_usual_and_what_is_commanded_once() -> None:
+    recording = run(stage(), there_and_back(12.0))
+    volts = recording.voltage.copy()
+    volts[7000:7150] = 9.0
+    shocked = replace(recording, columns={**recording.columns, "voltage": volts})
+    balance = ForceBalance(stage(), load_data([shocked]))
+    baseline(balance)
+    tried = Scales.of(Fitter(balance), Fitter(balance).fit([])).volts
+    usual = float(np.quantile(np.abs(volts), 0.95))
+    assert tried[-1] == 9.0 > 4.0 * usual
+    assert np.all(np.diff(np.log(tried)) <= np.log(2.0) + 1e-9)
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtcomp.diagnosis.data import MOST_ROWS, RUN_IN, WINDOWS, load_data
+from rtcomp.diagnosis.data import MOST_ROWS, RUN_IN, WINDOWS, load_data, with_rows
 from rtcomp.diagnosis.jumps import jumps
 from rtcomp.recording.outliers import answers, outliers
 from rtcomp.recording.reader import Recording
@@ -83,3 +83,25 @@ def test_windows_of_a_long_recording_do_not_miss_a_jump(row: int, sign: float) -
     assert all(np.diff(starts) >= rows) and starts[0] >= 0 and starts[-1] <= time.size - rows
     assert any(first + RUN_IN * rows * (first > 0) <= row + 25 < first + rows for first in starts)
     assert data.jumps[0].time == pytest.approx((row + 24.5) / 1000.0)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.integers(0, 99_999), max_size=7), st.integers(40_000, 100_000))
+def test_windows_are_moved_to_what_happens_once(wanted: list[int], size: int) -> None:
+    """They stay apart and within the recording; the first of the rows is always seen."""
+    rows, wanted = 9_000, [row % size for row in wanted]
+    starts = with_rows(np.linspace(0, size - rows, WINDOWS).astype(np.int64), wanted, rows, size)
+    assert all(np.diff(starts) >= rows) and starts[0] >= 0 and starts[-1] <= size - rows
+
+    def seen(row: int) -> bool:
+        return any(at + RUN_IN * rows * (at > 0) <= row < at + rows for at in starts.tolist())
+
+    assert all(seen(row) for row in wanted[:1])
+
+
+def test_a_command_that_is_large_once_is_in_a_window() -> None:
+    time, x = moved(rows=2 * MOST_ROWS)
+    volts = np.cos(time)
+    volts[23_000:23_150] = 9.0
+    data = load_data([Recording({"time": time, "position": x, "voltage": volts}, 1000.0)])
+    assert max(s.voltage.max() for s in data.segments) == 9.0
