@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import signal
+import threading
 from collections.abc import Iterator
 from types import FrameType
 
@@ -36,9 +37,9 @@ class Stop:
             self.requested = True
 
     def _take(self) -> None:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            # Signals can be handled in the main thread only; elsewhere the caller sets `requested`.
-            with contextlib.suppress(ValueError):
+        # Signals can be handled in the main thread only; elsewhere the caller sets `requested`.
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
                 self._before[number] = signal.signal(number, self._ask)
 
     def _restore(self) -> None:

@@ -22,11 +22,28 @@ Found = TypeVar("Found")
 
 
 class _Helpers:
-    """Threads for all cores but the caller's, and how many of them are idle."""
+    """Threads for all cores but the caller's, and how many of them are idle.
+
+    A plain lock and a number: an interrupt in the middle of a Semaphore leaves it locked.
+    """
 
     def __init__(self, count: int) -> None:
-        self.idle = threading.Semaphore(count)
+        self._lock = threading.Lock()
+        self._idle = count
         self.pool = ThreadPoolExecutor(max(count, 1), thread_name_prefix="rtcomp-diagnosis")
+
+    def take(self) -> bool:
+        """Take one along, if one is idle."""
+        with self._lock:
+            if not self._idle:
+                return False
+            self._idle -= 1
+            return True
+
+    def give_back(self) -> None:
+        """Say that one is idle again."""
+        with self._lock:
+            self._idle += 1
 
 
 @cache
@@ -69,19 +86,20 @@ def shared(
         try:
             work(None)
         finally:
-            helpers.idle.release()
+            helpers.give_back()
 
     at_work: list[Future[None]] = []
-    with signals_wait():
-        while len(at_work) < len(all_items) - 1 and helpers.idle.acquire(blocking=False):
+    while len(at_work) < len(all_items) - 1 and helpers.take():
+        with signals_wait():
             at_work.append(helpers.pool.submit(help_out))
     try:
         work(done)
     finally:
-        with signals_wait():
-            leave_the_rest()  # an interrupt or `done` may have ended the caller's part
-            for helper in at_work:
-                helper.result()
+        leave_the_rest()  # an interrupt or `done` may have ended the caller's part
+        if at_work:
+            with signals_wait():
+                for helper in at_work:
+                    helper.result()
     if failed:
         raise failed[min(failed)]
     return [found[at] for at in range(len(all_items))]
