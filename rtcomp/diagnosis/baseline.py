@@ -13,7 +13,6 @@ from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.replicate import left_by
-from rtcomp.diagnosis.settings import LEAST_GAIN
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
@@ -94,14 +93,14 @@ def _search_speed(fitter: Fitter, terms: Sequence[Term]) -> None:
 
 
 def with_offset(fitter: Fitter, fitted: Fitted) -> Fitted:
-    """Return the belief refitted beside a constant force where that matters too little to be named.
+    """Return the belief refitted beside a constant force, where that gains anything.
 
-    No axis is free of one: of a current loop, a cable, a position whose zero is not that of a spring.
+    No axis is free of one: of a current loop, a cable, a position whose zero is not that of a spring. What
+    else is missing hides behind it. Whether it is to be named is judged at the end.
     """
     fitter.offset = True
     beside = fitter.fit([])
-    gained = 1.0 - float(np.sqrt(beside.errors.sum() / fitted.errors.sum()))
-    if 0.0 < gained < LEAST_GAIN:
+    if beside.errors.sum() < fitted.errors.sum():
         return beside
     fitter.offset = False
     return fitted
