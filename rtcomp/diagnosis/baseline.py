@@ -13,6 +13,7 @@ from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.replicate import left_by
+from rtcomp.diagnosis.settings import LEAST_GAIN
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
@@ -93,14 +94,14 @@ def _search_speed(fitter: Fitter, terms: Sequence[Term]) -> None:
 
 
 def with_offset(fitter: Fitter, fitted: Fitted) -> Fitted:
-    """Return the belief refitted beside a constant force, where that gains anything.
+    """Return the belief refitted beside a constant force where that matters too little to be named.
 
-    No axis is free of one: of a current loop, a cable, a position whose zero is not that of a spring. What
-    else is missing hides behind it. Whether it is to be named is judged at the end.
+    No axis is free of one: of a current loop, a cable, a position whose zero is not that of a spring.
     """
     fitter.offset = True
     beside = fitter.fit([])
-    if beside.errors.sum() < fitted.errors.sum():
+    gained = 1.0 - float(np.sqrt(beside.errors.sum() / fitted.errors.sum()))
+    if 0.0 < gained < LEAST_GAIN:
         return beside
     fitter.offset = False
     return fitted

@@ -132,7 +132,7 @@ def search(
             break
     if found.elsewhere:
         _settled_on_chosen(fitter, found)
-    if fitter.offset:
+    if fitter.offset and found.chosen.terms:
         _offset_judged(fitter, found)
     _solid(fitter, found)
     return found
