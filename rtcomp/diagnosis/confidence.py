@@ -64,7 +64,7 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         rest = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
         models = [chosen, *_others(fitter, found, i, rest, ends)]
         errors = [_by_cell(fitter, m, i if m is chosen else len(m.terms) - 1) for m in models]
-        errors, rows = _above(found, errors, _independent(fitter, chosen) / errors[0].size)
+        errors, rows = above_noise(found, errors, _independent(fitter, chosen) / errors[0].size)
         weight = probabilities(errors, rows, [m.size for m in models])
         least = (1.0 - ALIAS) * log_gain(rest.errors, chosen.errors)
         members = {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
@@ -110,7 +110,7 @@ def _by_cell(fitter: Fitter, model: Fitted, at: int) -> Floats:
     return np.asarray(found[np.bincount(cell[used], minlength=found.size) > 0] + 1e-300)
 
 
-def _above(found: Search, errors: Sequence[Floats], rows: float) -> tuple[list[Floats], float]:
+def above_noise(found: Search, errors: Sequence[Floats], rows: float) -> tuple[list[Floats], float]:
     """Return squared errors (C,) of models in cells plus what noise leaves, and how many rows each tells of.
 
     By logarithms alone a cell in which hardly anything moves would count as much as one in which a model

@@ -67,8 +67,11 @@ def fixed_units(believed: Stage) -> list[str]:
     found = []
     for effect in believed.mechanics.effects:
         kind = ent.kind_of(effect)
-        still = [p.unit for p in kind.parameters if not (ent.adds_force(kind) and p.name in kind.linear)]
-        found += [unit for unit in (FORCE, LENGTH) if any(power_of(unit, u) for u in still)]
+        moves = kind.linear if ent.adds_force(kind) else ()
+        still = [p.unit for p in kind.parameters if p.name not in moves]
+        # What is given by a list, as a curve through points, stays as it is.
+        listed = bool(kind.element) or not kind.parameters
+        found += [unit for unit in (FORCE, LENGTH) if listed or any(power_of(unit, u) for u in still)]
         found.append(kind.other_unit)
     return found
 

@@ -143,3 +143,15 @@ def test_a_force_that_goes_by_one_thing_by_an_unknown_law_is_a_rival_of_a_name()
         errors = errors_beside(fitter, model, overtones(fitter, model, model.entries[0]))
         found.append(rival(fitter, base, errors, 0.5, model.entries[0]))
     assert found == ["position", ""]
+
+
+@pytest.mark.parametrize(("times", "harmonics"), [(1.8, 0), (2.6, 2), (4.4, 4)])
+def test_harmonics_are_of_a_wave_that_repeats_within_the_stroke(times: float, harmonics: int) -> None:
+    """Those of twice the period too, where that comes twice; four columns each, two of them by the period."""
+    axis = stage()
+    balance = ForceBalance(axis, load_data([run(axis, there_and_back(12.0))]))
+    base, fitter = baseline(balance), Fitter(balance)
+    low, high = balance.data.stroke
+    wave = {"name": "cogging", "amplitude": 0.5, "period": (high - low) / times, "phase": 0.3}
+    model = fitter.fit([Term(wave, frozenset())], base)
+    assert overtones(fitter, model, wave).shape[0] == 4 * harmonics

@@ -80,7 +80,9 @@ def test_too_little_to_tell(told: Numbers) -> None:
 def test_a_unit_in_which_something_is_fixed_did_not_move() -> None:
     stop = axis(effects=[{"name": "end-stop", "position": 1e-3, "stiffness": 1e5}])
     scaled = axis(effects=[{"name": "sensor-scale", "scale": 1.02}])
+    curve = axis(effects=[{"name": "position-force", "knots": [-1e-3, 0.0, 1e-3], "values": [0.0, 0.4, 0.0]}])
     assert "m" in fixed_units(stop)
+    assert {"N", "m"} <= set(fixed_units(curve))
     assert "m" in fixed_units(scaled) and "N" not in fixed_units(scaled)
     spring = axis(effects=[{"name": "parallel-spring", "stiffness": 100.0}])
     assert not set(fixed_units(spring)) & {"N", "m"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -16,11 +17,13 @@ from rtcomp.diagnosis.acceptance import doubts
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import baseline
 from rtcomp.diagnosis.candidates import Candidate, candidates
+from rtcomp.diagnosis.confidence import above_noise
 from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.replicates import gain_in_full, null_of
 from rtcomp.diagnosis.screening import Screen
+from rtcomp.diagnosis.selection import Search
 from rtcomp.diagnosis.significance import Null, confidence_set, log_gain, probabilities
 
 
@@ -156,3 +159,16 @@ def test_a_wave_is_not_doubted_for_what_makes_its_form_another(first: float, oth
     noise = Null(np.ones(19), np.ones_like(chosen.errors) * np.linspace(0.9, 1.1, 19)[:, None])
     assert doubts(fitter, chosen, noise)[0].left < 0.05
     assert fitter.above_noise(chosen) > 0.3 * fitter.above_noise(base)
+
+
+def test_rivals_are_compared_where_they_leave_more_than_noise() -> None:
+    """Noise alone is likelier than a failure in some cells with less than noise in the others."""
+    random = np.random.default_rng(2)
+    right = 20.0 * random.uniform(0.5, 1.5, 80)
+    fails = np.where(np.arange(80) % 5 == 0, 2000.0, 0.2 * right)
+    assert np.log(fails).mean() < np.log(right).mean()
+    null = Null(np.ones(3), np.full((3, 8), 10.0 * 20.0))
+    found = cast(Search, SimpleNamespace(null=null))
+    cells, rows = above_noise(found, [right, fails], 10.0)
+    assert probabilities([right, fails], 10.0, [1, 1])[0] < 0.5 < 0.95 < probabilities(cells, rows, [1, 1])[0]
+    assert rows == pytest.approx(10.0 * (1.0 + 20.0 / right.mean()))
