@@ -88,8 +88,6 @@ HIDDEN: dict[str, Draw] = {
     "tonal-disturbance": _tone,
 }
 """What may be hidden, and how its size is drawn."""
-BUDGET = 300.0
-"""Time (s) for the diagnosis: a first run compiles it, which takes a slow machine a minute."""
 CLOCKED = frozenset({"tonal-disturbance"})
 """Those that go by the stage's own time, which is known in simulation only."""
 
@@ -240,7 +238,7 @@ def close_circle(
     """
     ignorant = compensated(concealing, "hidden", model, out=out, watch=watch)
     recording = recording_of(ignorant, None if out is None else out / "hidden.h5")
-    found = diagnose(believed(concealing.stage, model), [recording], budget=BUDGET, progress=progress)
+    found = diagnose(believed(concealing.stage, model), [recording], progress=progress)
     extended = compensated(concealing, "found", stage=found.stage, out=out, watch=watch)
     return Circle(hidden, ordinary, ignorant, found, extended, concealing.run.compensate.settle)
 

@@ -40,7 +40,7 @@ COLUMNS = ("time", "position", "voltage", "reference", "enabled", "status", "ove
 )  # fmt: skip
 @click.option(
     "--budget", type=click.FloatRange(0.0, min_open=True), default=60.0, show_default=True, metavar="SECONDS",
-    help="Ends the search with the best answer so far.",
+    help="Ends the search with the best answer so far; compiling, once on a machine, is not counted.",
 )  # fmt: skip
 @click.option(
     "--assume-units", is_flag=True,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.confirmed import denied
 from rtcomp.diagnosis.fit import Fitter
@@ -25,6 +25,7 @@ PLAINER = 1e-3
 """Logarithm of the error that one parameter more must gain to count at all."""
 TOO_MUCH = "{:.0f} % of what there is without it is left, more than noise"
 NOT_SHOWN = "it does not show in {}"
+WEIGHTLESS = "beside it nothing of the mass is left"
 STANDS_IN = "a force that goes by {} explains more, and more than noise is left"
 
 
@@ -63,7 +64,7 @@ def pruned(
 
     Beside the best of the models of these others: of the fit that is left, and of those that `passed` before.
     """
-    while len(model.terms) > 1 and time.monotonic() < ends:
+    while len(model.terms) > 1 and clock.now() < ends:
         rest = []
         for i in range(len(model.terms)):
             others = [*model.terms[:i], *model.terms[i + 1 :]]
@@ -103,16 +104,17 @@ class Doubt:
 def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
     """Return why each effect of a model is no finding.
 
-    Its size may be nothing, a number of it is at a physical bound, or more is left beside it than noise and a
-    part of what there is without it: what else makes the rest may make that part as well. The part is the
-    geometric mean of that of the force and of that as the objective weighs it. What replicates of the model
-    leave too is not counted as left. Or, where more than noise is left, a force that is any function of one
-    thing explains more. Or it does not show in the other objective.
+    Its size may be nothing, a number of it is at a physical bound, or the mass at its own; or more is left
+    beside it than noise and a part of what there is without it: what else makes the rest may make that part
+    as well. The part is the geometric mean of that of the force and of that as the objective weighs it. What
+    replicates of the model leave too is not counted as left. Or, where more than noise is left, a force that
+    is any function of one thing explains more. Or it does not show in the other objective.
     """
     said = []
     more = null is not None and null.p_of_error(chosen.errors) < LEVEL
     for i, span in enumerate(told(fitter, chosen)):
         why = "its size may be nothing" if span.nothing else ""
+        why = WEIGHTLESS if chosen.weightless else why
         why = f"{', '.join(span.bound)} at its bound" if span.bound else why
         left, elsewhere = 1.0, False
         if not why:

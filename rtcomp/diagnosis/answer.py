@@ -72,7 +72,8 @@ def answer(
 ) -> Diagnosis:
     """Return the diagnosis that a search ends in, with what was not seen as far as the time `ends` allows."""
     balance, rest = fitter.balance, Rest.of(fitter, found)
-    base, chosen = (_unbiased(fitter, found, model) for model in (found.baseline, found.chosen))
+    base = _unbiased(fitter, found, found.baseline)
+    chosen = base if found.chosen is found.baseline else _unbiased(fitter, found, found.chosen)
     spans = told(fitter, chosen)
     notes = _notes(balance, found)
     shares = _shares(base, chosen, sets)

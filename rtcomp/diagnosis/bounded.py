@@ -2,28 +2,54 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from rtcomp.kernels import Floats, compiled
+from rtcomp.kernels import Floats, compiled, summing
+
+
+@summing
+def _along(one: Floats, other: Floats, count: int) -> float:
+    """Return the product of the first members of two rows."""
+    total = 0.0
+    for k in range(count):
+        total += one[k] * other[k]
+    return total
 
 
 @compiled
 def _free(gram: Floats, cross: Floats, state: np.ndarray, c: Floats) -> None:
-    """Put the free members of `c` to where the slope is nothing, the others held."""
-    free = np.flatnonzero(state == 0)
-    if free.size == 0:
-        return
-    part = np.empty((free.size, free.size))
-    right = np.empty(free.size)
-    for a in range(free.size):
-        i = free[a]
-        right[a] = cross[i]
+    """Put the free members of `c` to where the slope is nothing, the others held, by Cholesky's factor.
+
+    Written out: numba's own solver alone takes as long to compile as the rest of a diagnosis. Raises
+    LinAlgError where the free part of `gram` is not positive definite.
+    """
+    factor, aim = np.empty((c.size, c.size)), np.empty(c.size)
+    free = np.empty(c.size, dtype=np.int64)
+    count = 0
+    for i in range(c.size):
+        if state[i] != 0:
+            continue
+        right = cross[i]
         for j in range(c.size):
             if state[j] != 0:
-                right[a] -= gram[i, j] * c[j]
-        for b in range(free.size):
-            part[a, b] = gram[i, free[b]]
-    c[free] = np.linalg.solve(part, right)
+                right -= gram[i, j] * c[j]
+        row = factor[count]
+        for b in range(count):
+            row[b] = (gram[i, free[b]] - _along(row, factor[b], b)) / factor[b, b]
+        pivot = gram[i, i] - _along(row, row, count)
+        if not 0.0 < pivot < np.inf:
+            raise np.linalg.LinAlgError("columns are alike, or hold no numbers")
+        row[count] = math.sqrt(pivot)
+        aim[count] = (right - _along(row, aim, count)) / row[count]
+        free[count] = i
+        count += 1
+    for a in range(count - 1, -1, -1):
+        for b in range(a + 1, count):
+            aim[a] -= factor[b, a] * aim[b]
+        aim[a] /= factor[a, a]
+        c[free[a]] = aim[a]
 
 
 @compiled
@@ -42,14 +68,16 @@ def _stepwise(gram: Floats, cross: Floats, low: Floats, high: Floats, tolerance:
     those held the one that gains most is let free.
     """
     size = cross.size
-    c = np.minimum(np.maximum(np.zeros(size), low), high)
+    c, aim = np.empty(size), np.empty(size)
     state = np.zeros(size, dtype=np.int8)
     for i in range(size):
+        c[i] = min(max(0.0, low[i]), high[i])
         state[i] = -1 if c[i] <= low[i] else (1 if c[i] >= high[i] else 0)
     for _ in range(20 * size):
         met = 0
         while met >= 0:
-            aim = c.copy()
+            for i in range(size):
+                aim[i] = c[i]
             _free(gram, cross, state, aim)
             met, part = -1, 1.0
             for i in range(size):
@@ -57,14 +85,17 @@ def _stepwise(gram: Floats, cross: Floats, low: Floats, high: Floats, tolerance:
                     way = ((low[i] if aim[i] < low[i] else high[i]) - c[i]) / (aim[i] - c[i])
                     if way < part:
                         met, part = i, way
-            c += part * (aim - c)
+            for i in range(size):
+                c[i] += part * (aim[i] - c[i])
             if met >= 0:
                 state[met] = -1 if aim[met] < low[met] else 1
                 c[met] = low[met] if state[met] < 0 else high[met]
-        slope = gram @ c - cross
-        gains = np.where(state != 0, state * slope, 0.0)
-        best = int(np.argmax(gains))
-        if gains[best] <= tolerance:
+        best, most = -1, tolerance
+        for i in range(size):
+            gain = state[i] * (_along(gram[i], c, size) - cross[i])
+            if gain > most:
+                best, most = i, gain
+        if best < 0:
             break
         state[best] = 0
     return c
@@ -81,17 +112,20 @@ def bounded_minimum(gram: Floats, cross: Floats, low: Floats, high: Floats) -> F
     state = np.zeros(size, dtype=np.int8)  # 0 free, -1 at low, 1 at high
     wrong = np.zeros(size, dtype=np.int8)
     best, rounds = size + 1, 5
-    tolerance = 1e-10 * (np.abs(cross).max() + 1.0)
+    most = 0.0
+    for i in range(size):
+        most = max(most, abs(cross[i]))
+    tolerance = 1e-10 * (most + 1.0)
     c = np.zeros(size)
     for _ in range(20 * size):
         for i in range(size):
             if state[i] != 0:
                 c[i] = low[i] if state[i] < 0 else high[i]
         _free(gram, cross, state, c)
-        slope = gram @ c - cross
         count = last = 0
         for i in range(size):
-            wrong[i] = _wrong(state[i], c[i], slope[i], low[i], high[i], tolerance)
+            slope = _along(gram[i], c, size) - cross[i]
+            wrong[i] = _wrong(state[i], c[i], slope, low[i], high[i], tolerance)
             if wrong[i] != 0:
                 count, last = count + 1, i
         if count == 0:

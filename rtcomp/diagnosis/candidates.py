@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import itertools
 import math
-import time
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import BASE, ForceBalance
 from rtcomp.diagnosis.cores import shared
@@ -105,7 +105,7 @@ def candidates(
     In further forms where `explained` tells how much candidates take away.
 
     With `events`, those only that happen once, at a moment that the residual shows. Those not made until the
-    time `ends` (time.monotonic) are left out; every effect's first start comes before the others. What is
+    time `ends` (clock.now) are left out; every effect's first start comes before the others. What is
     `known` beside a smaller model is taken from there: much the same to first order, where a fit only begins.
     """
     balance = fitter.balance
@@ -121,7 +121,7 @@ def candidates(
 
     def make(item: tuple[type[Effect], tuple[Entry, str]]) -> Candidate | None:
         before = made.get(_key(item[1]))
-        if before is not None or time.monotonic() > ends:
+        if before is not None or clock.now() > ends:
             return before
         return _candidate(fitter, fitted, *item)
 

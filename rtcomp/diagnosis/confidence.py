@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.candidates import started
 from rtcomp.diagnosis.fit import Fitter
@@ -180,7 +180,7 @@ def _others(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -
         for m in found.alternatives
         if sorted(ent.names(m.entries)[:-1]) == kept and m.terms[-1].entry["name"] != name and not m.at_bound
     ]
-    if known or time.monotonic() > ends:
+    if known or clock.now() > ends:
         return known
     beside = (found.beside or ()) if fitter.by_force else ()
     seen = look(fitter, rest, known=beside, without=[str(name)])

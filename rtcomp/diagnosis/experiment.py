@@ -34,7 +34,7 @@ def manoeuvres(motion: View) -> dict[str, dict[str, Any]]:
         },
         "small fast motion up to five times the bandwidth": {
             "kind": "multisine", "amplitude": 0.05 * half,
-            "band": {"low": 1.0, "high": 60.0, "count": 40}, **common,
+            "band": {"low": 1.0, "high": 59.5, "count": 40}, **common,  # 1.5 Hz apart: repeats every 2 s
         },
         "reversals of decreasing size": {
             "kind": "nested-reversals", "amplitude": half, "ratio": 0.8, "count": 18, "stroke_time": 1.0,

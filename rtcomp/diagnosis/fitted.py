@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtcomp.diagnosis.entries import Entry
-from rtcomp.diagnosis.free import Free, Term
+from rtcomp.diagnosis.free import AT_BOUND, Free, Term
 from rtcomp.diagnosis.regression import Grams, Prior, System
 from rtcomp.kernels import Floats
 
@@ -46,9 +46,17 @@ class Fitted:
 
     @property
     def at_bound(self) -> bool:
-        """Tell whether a nonlinear parameter of the last term came out at its bound."""
+        """Tell whether a nonlinear parameter of the last term, or the mass, came out at its bound."""
         last = len(self.terms) - 1
-        return any(f.at_bound(self.terms) for f in self.free if f.term == last)
+        return self.weightless or any(f.at_bound(self.terms) for f in self.free if f.term == last)
+
+    @property
+    def weightless(self) -> bool:
+        """Tell whether the mass came out as small as it may be: a motion that needs no force is no axis's.
+
+        What drives it nowhere and what holds it, as strong as the drive, leave nothing open between them.
+        """
+        return bool(self.coefficients[0] <= (1.0 + AT_BOUND) * self.prior.low[0])
 
     @property
     def free_columns(self) -> Floats:

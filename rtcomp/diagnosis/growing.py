@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 
 import numpy as np
 
+from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.candidates import Candidate, started
 from rtcomp.diagnosis.cores import shared
@@ -39,7 +39,7 @@ def in_better_form(fitter: Fitter, found: Sequence[Fitted], ends: float) -> list
     """Return the last terms in another form, where that leaves less at the same values."""
 
     def better_than(larger: Fitted, term: Term) -> bool:
-        if time.monotonic() > ends:
+        if clock.now() > ends:
             return False
         try:
             return fitter.quick([*larger.terms[:-1], term]) < larger.sse
@@ -63,7 +63,7 @@ def fitted_in_time(fitter: Fitter, model: Fitted, terms: Sequence[Term], ends: f
     """Return the model with each term, fitted, where that is possible; none is begun after `ends` (s)."""
 
     def fit(term: Term) -> Fitted | None:
-        if time.monotonic() > ends:
+        if clock.now() > ends:
             return None
         try:
             return fitter.fit([*model.terms, term], model)

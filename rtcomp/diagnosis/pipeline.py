@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rtcomp.diagnosis import clock
 from rtcomp.diagnosis.answer import Rest, answer
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import baseline, settle, with_offset
@@ -42,6 +42,9 @@ SEARCH, TELL_APART = 0.75, 0.9
 """Parts of the budget at which the search ends, and what then tells its models apart."""
 FORCES = 0.5
 """Part of the time for the search after which positions may have to judge instead of forces."""
+COMPILED = "compiling took {:.0f} s, which happens once on a machine and is not counted in the budget"
+LONG = 1.0
+"""Time (s) of compiling that is worth a note."""
 BAND_LIMITED = "the command is taken as band-limited between rows, which fits better than held"
 Located = Callable[[float, Sequence[Place]], None]
 """Told, before anything is named, what part of the force the refitted stage leaves open (rms), and where."""
@@ -62,7 +65,7 @@ def diagnose(
 
     `held` tells whether the command is held from row to row or goes on between rows as a band-limited
     signal; None where both are to be tried. `budget` (s) ends the search with the best answer so far; it is
-    counted from the time `began` (time.monotonic), or from now.
+    counted from the time `began` (time.monotonic), or from now, and does not count what compiling takes.
     `progress` hears how far each step is, `located` the places of the mismatch before anything is named.
     Raises RtcompError where the budget does not do for the baseline.
     """
@@ -83,10 +86,10 @@ def _diagnosed(
     seed: int,
 ) -> Diagnosis:
     say: Progress = progress or (lambda _part, _what: None)
-    ends = (time.monotonic() if began is None else began) + budget
+    ends, compiled = clock.ends_at(budget, began), clock.compiling()
     say(0.0, "balance")
     objectives = _objectives(stage, recordings, held, ends - (1.0 - SEARCH) * budget)
-    if time.monotonic() > ends:
+    if clock.now() > ends:
         raise RtcompError(f"the budget of {budget:g} s ended before the stage was refitted; give it more")
     balance, base = objectives[0].balance, objectives[0].base
     reserved = Reserved(balance)
@@ -101,7 +104,7 @@ def _diagnosed(
     fitter, found = _searched(objectives, until(finish, FORCES) if hidden else finish, say, seed)
     doubtful = hidden and (found.denied or Rest.of(fitter, found).significant)
     if doubtful and hides(fitter, found.chosen):
-        if time.monotonic() < finish:
+        if clock.now() < finish:
             fitter, found = _by_trajectory(stage, fitter, finish, say, seed)
         else:
             found.not_tried.append("simulated positions in the place of forces")
@@ -115,6 +118,8 @@ def _diagnosed(
     notes = [BAND_LIMITED] if len(objectives) > 1 and not fitter.balance.data.held else []
     if done.position is not None:
         notes.append(STICKS.format(100.0 * untold(balance), done.position.seconds))
+    compiled = clock.compiling() - compiled
+    notes += [COMPILED.format(compiled)] if compiled > LONG else []
     notes += [f"not tried within {budget:g} s: {what}" for what in found.not_tried]
     return replace(done, notes=[*notes, *done.notes], not_tried=found.not_tried)
 
@@ -219,7 +224,7 @@ def _searched(
     doubt = doubted if len(objectives) > 1 else None
     found = search(best.fitter, best.base, ends, say, seed, doubt, best.first)
     told = not Rest.of(best.fitter, found).significant
-    if doubt is None or (not found.doubted and (told or time.monotonic() > ends)):
+    if doubt is None or (not found.doubted and (told or clock.now() > ends)):
         return best.fitter, found
     fitter = Fitter(objectives[1].balance)
     settle(fitter)

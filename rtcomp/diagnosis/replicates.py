@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rtcomp.diagnosis import clock, starting
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis import starting
 from rtcomp.diagnosis.candidates import Candidate, candidates, started
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fit import Fitter
@@ -57,7 +56,7 @@ def null_of(
     Replicates are drawn until it is plain whether `gain` and the error of the fit are beyond them: sequential
     Monte Carlo (Besag and Clifford 1991, Biometrika 78(2)). A model that cannot be kept on the recorded
     motion is judged by surrogates of its residual instead. The largest gains are those of full fits, the
-    others in proportion; after the time `full` (time.monotonic) all are those of first order, and after
+    others in proportion; after the time `full` (clock.now) all are those of first order, and after
     `ends` a few replicates must do.
     """
     try:
@@ -99,7 +98,7 @@ def null_of(
         if null.p_value(gain) < LEVEL or not null.plain(gain, fitted.errors, LEVEL):
             drawn = _largest_in_full(drawn)
             null = _null(fitted, [*found, *drawn], chance)
-        if null.plain(gain, fitted.errors, LEVEL) or time.monotonic() > ends:
+        if null.plain(gain, fitted.errors, LEVEL) or clock.now() > ends:
             break
         found += drawn
         first, last = last, min(last + MORE, REPLICATES)
@@ -131,7 +130,7 @@ def gain_in_full(
     fitter: Fitter, model: Fitted, candidate: Candidate, screened: Screened, ends: float = math.inf
 ) -> float:
     """Return the gain of a candidate beside a model in a short fit, or, after `ends`, to first order."""
-    if time.monotonic() > ends:
+    if clock.now() > ends:
         return screened.gain
     try:
         larger = fitter.fit([*model.terms, started(candidate, screened.sizes)], model, starting.FEW)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
-import time
 from collections.abc import Callable
 
 import numpy as np
 
+from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.baseline import CLOSE
 from rtcomp.diagnosis.cores import shared
@@ -104,7 +104,7 @@ def _left(fitter: Fitter, model: Fitted, term: Term, ends: float) -> Callable[..
     frequencies = [p for p in ent.kind_of(term.entry).parameters if p.unit == "Hz" and p.default is not None]
 
     def left(entry: Entry, turns: int = 1) -> float:
-        if time.monotonic() > ends:
+        if clock.now() > ends:
             return math.inf
         at_hand, sse = weights, math.inf
         if any(entry[p.name] > fitter.balance.data.rate for p in frequencies):

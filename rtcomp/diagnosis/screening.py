@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.candidates import Candidate, candidates
 from rtcomp.diagnosis.fit import Fitter
@@ -205,6 +205,6 @@ def look(
 
     taken = [*ent.names(model.entries), *without]
     made = candidates(fitter, model, taken, ends=ends, known=known or (), explained=explained)
-    cut = time.monotonic() > ends
+    cut = clock.now() > ends
     screen = Screen(made, fitter, beside)
     return Look(made, screen.beside(model), screen, None, cut)

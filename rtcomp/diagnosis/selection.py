@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
+from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.acceptance import accepted, doubts, exhausted, pruned, score
 from rtcomp.diagnosis.baseline import settle
@@ -68,7 +68,7 @@ def search(
     doubted: Callable[[Fitted], bool] | None = None,
     first: Look | None = None,
 ) -> Search:
-    """Return the best model that the one test accepts; stops at the time `ends` (time.monotonic).
+    """Return the best model that the one test accepts; stops at the time `ends` (clock.now).
 
     Stops too where the objective itself is `doubted` because of the best model so far. `first` is the look at
     all candidates beside the baseline, where there was one.
@@ -81,7 +81,7 @@ def search(
     for step in range(MOST_EFFECTS + 1):
         judged = None
         while beam and judged is None:
-            late = step > 0 and time.monotonic() > ends
+            late = step > 0 and clock.now() > ends
             at_hand = first if step == 0 else None
             known = found.beside if fitter.by_force else None
             seen = _judged(fitter, beam[0], seed + step, say, at_hand, known, ends, late=late)
@@ -102,7 +102,7 @@ def search(
         done = null.settled(judged.gain, beam[0].errors, LEVEL)
         if done or step == MOST_EFFECTS or exhausted(fitter, beam[0], everything):
             break
-        if time.monotonic() > ends:
+        if clock.now() > ends:
             if short:  # of a step that was cut, only a model that leaves nothing is sure
                 found = replace(before, not_tried=found.not_tried)
             else:
@@ -124,7 +124,7 @@ def search(
         beam = [m for m in beam if _better(fitter, m, found.chosen, null, everything)]
         if not beam:
             break
-        if time.monotonic() < ends:
+        if clock.now() < ends:
             beam, grown = _resettled(fitter, found, beam, grown, parents, ends)
             everything = float(found.baseline.errors.sum())
         if doubted is not None and doubted(beam[0]):
@@ -145,11 +145,11 @@ def _grown(
 
     And whether time cut it short: another is begun only where one that takes as long would end in time.
     """
-    began = time.monotonic()
+    began = clock.now()
     grown = grow(fitter, beam[0], seen.candidates, seen.screened, ends)
     near = [m for m in beam[1:] if score(m) < score(beam[0]) + NEAR]
     for other in near if others else []:
-        moment = time.monotonic()
+        moment = clock.now()
         if 2.0 * moment - began > ends:
             return grown, True
         began = moment
@@ -158,7 +158,7 @@ def _grown(
         last = beam[0].terms[-1:]
         missing = [t for t in last if t.entry["name"] not in ent.names(other.entries)]
         grown += fitted_in_time(fitter, other, missing, ends)
-    return grown, time.monotonic() > ends
+    return grown, clock.now() > ends
 
 
 def _in_other_forms(fitter: Fitter, found: Search, grown: Sequence[Fitted], ends: float) -> list[Fitted]:
@@ -258,7 +258,7 @@ def _resettled(
     are settled in turn, as long as the error falls.
     """
     best, left, found.elsewhere = beam[0], math.inf, True
-    while best.sse < (1.0 - LEAST_GAIN) ** 2 * left and time.monotonic() < ends:
+    while best.sse < (1.0 - LEAST_GAIN) ** 2 * left and clock.now() < ends:
         left = best.sse
         settle(fitter, best.terms)
         best = fitter.fit(best.terms, best)
@@ -276,8 +276,8 @@ def _refitted(fitter: Fitter, models: Sequence[Fitted]) -> list[Fitted]:
 
 
 def until(ends: float, share: float) -> float:
-    """Return the time at which a `share` of that which is left up to `ends` has passed (time.monotonic)."""
-    now = time.monotonic()
+    """Return the time at which a `share` of that which is left up to `ends` has passed (clock.now)."""
+    now = clock.now()
     return now + share * max(ends - now, 0.0)
 
 
@@ -295,7 +295,8 @@ def _judged(
     """Return the look beside a model with its null distribution, in a part of the time up to `ends`.
 
     `first` is that look, where it was taken before; `known` are candidates beside a smaller model. Where it
-    is too `late` for one, only what chance leaves is looked at.
+    is too `late` for one, only what chance leaves is looked at. Where a belief leaves too little for any
+    effect to matter, a few replicates do, whatever they show.
     """
     names = ent.names(model.entries)
     what = f"beside {' and '.join(names)}" if names else "search"
@@ -305,6 +306,8 @@ def _judged(
     looked = until(ends, LOOKED)
     seen = first or look(fitter, model, looked, known)
     say(0.5, what)
+    if not model.terms and exhausted(fitter, model, float(model.errors.sum())):
+        ends = -math.inf
     return replace(seen, null=null_of(fitter, model, seen.screen, seen.gain, seed, looked, ends))
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
 
+from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.entries import Entry
@@ -39,7 +39,7 @@ def as_they_are(left: Callable[[Term], float], families: Sequence[Sequence[Term]
 
     def tried(term: Term) -> float:
         try:
-            return left(term) if time.monotonic() < ends else math.inf
+            return left(term) if clock.now() < ends else math.inf
         except (ConfigError, np.linalg.LinAlgError):
             return math.inf
 
@@ -79,7 +79,7 @@ def likeliest(
     starts = [(i, term) for i, terms in enumerate(shared(begun, families)) for term in terms]
 
     def tried(start: tuple[int, Term]) -> tuple[float, Term]:
-        if time.monotonic() > ends:
+        if clock.now() > ends:
             return math.inf, start[1]
         try:
             terms, slopes = [*model.terms, start[1]], model.system.columns

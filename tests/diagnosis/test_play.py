@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 
 import numpy as np
 import pytest
 from recorded import STAGE, run, stage, there_and_back
 
+from rtcomp.diagnosis import clock
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import baseline
 from rtcomp.diagnosis.data import load_data
@@ -129,7 +129,7 @@ def test_a_scan_that_runs_out_of_time_says_nothing_on_the_terminal(seconds: floa
     play = {"name": "backlash", "gap": 4e-6, "share": 0.35, "contact": 140.0}
     balance = ForceBalance(stage(), load_data([run(stage(effects=[play]), there_and_back(12.0))]))
     base, begun = baseline(balance), Term.of({"name": "backlash", "gap": 1e-6})
-    assert len(scanned(Fitter(balance), base, begun, time.monotonic() + seconds)) <= 2
+    assert len(scanned(Fitter(balance), base, begun, clock.now() + seconds)) <= 2
 
 
 def test_a_scan_of_an_axis_without_play_finds_none_that_explains_it() -> None:

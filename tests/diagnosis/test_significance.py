@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
@@ -13,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recorded import run, stage, there_and_back
 
+from rtcomp.diagnosis import clock
 from rtcomp.diagnosis.acceptance import doubts
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import baseline
@@ -83,7 +83,7 @@ def test_the_largest_gain_is_that_of_a_fit() -> None:
     right = fitter.fit([Term.of({"name": "drive-deadband", "width": 0.3})], base)
     assert screened[best].gain < fully
     assert fully == pytest.approx(log_gain(base.errors, right.errors), rel=0.02)
-    late = time.monotonic() - 1.0
+    late = clock.now() - 1.0
     assert gain_in_full(fitter, base, made[best], screened[best], late) == screened[best].gain
 
 

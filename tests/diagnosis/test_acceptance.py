@@ -1,0 +1,41 @@
+"""What is no finding, however well it fits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from recorded import run, stage, there_and_back
+
+from rtcomp.diagnosis.acceptance import accepted, doubts
+from rtcomp.diagnosis.balance import ForceBalance
+from rtcomp.diagnosis.baseline import baseline
+from rtcomp.diagnosis.data import load_data
+from rtcomp.diagnosis.fit import Fitter
+from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.significance import Null
+
+STRIBECK = {"name": "stribeck", "rise": 0.4, "velocity": 1e-3}
+BY_LOAD = {"name": "load-dependent-friction", "form": "linear", "stiffening": 1.0}
+
+
+@pytest.mark.parametrize(("share", "coefficient"), [(0.5, 1.05), (0.9, 0.9)])
+def test_a_drive_that_gives_nothing_and_friction_that_holds_the_rest_explain_nothing(
+    share: float, coefficient: float
+) -> None:
+    """A wide dead zone and friction as strong as its load leave an axis without mass nothing to explain."""
+    recording = run(stage(effects=[STRIBECK]), there_and_back(16.0))
+    balance = ForceBalance(stage(), load_data([recording]))
+    base = baseline(balance)
+    fitter = Fitter(balance)
+    width = share * float(np.abs(recording.voltage).max())
+    holds = Term.of({**BY_LOAD, "coefficient": coefficient})
+    model = fitter.fit([holds, Term.of({"name": "drive-deadband", "width": width})], base)
+    assert model.sse < 1e-3 * base.sse
+    assert model.weightless
+    null = Null(np.linspace(0.0, 0.01, 19), np.tile(model.errors, (19, 1)))
+    assert not accepted(fitter, model, base, null, float(base.errors.sum()))
+    assert all("mass" in doubt.why for doubt in doubts(fitter, model, null))
+    assert not base.weightless
+    true = fitter.fit([Term.of({**STRIBECK, "rise": 0.2})], base)
+    assert true.sse < 0.05 * base.sse
+    assert accepted(fitter, true, base, null, float(base.errors.sum()))
