@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytestmark = pytest.mark.realtime
 TOP = Path(__file__).resolve().parents[2]
 BENCHMARKS = sorted(path.name for path in (TOP / "tools").glob("bench_*.py"))
 
@@ -95,6 +94,7 @@ def test_tracking(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_speed(tmp_path: Path) -> None:
     found = figures(tmp_path, "bench_speed.py", "--no-demo", "--seconds", 2)
     assert found["faster than numpy, sample by sample"]["value"] > 20.0
@@ -102,6 +102,7 @@ def test_speed(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_a_diagnosis_without_recordings_to_judge(tmp_path: Path) -> None:
     found = figures(tmp_path, "bench_diagnosis.py", "--seconds", 15, "--minutes", 3)
     assert "cogging" in found["15 s at 1 kHz: everything"]["note"]
@@ -133,6 +134,7 @@ def test_drift(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_a_killed_run_keeps_its_file(tmp_path: Path) -> None:
     found = figures(tmp_path, "bench_kill.py", "--kills", 1)
     for who in ("loop", "loop and recorder"):
@@ -146,6 +148,7 @@ def test_damage_into_the_hosts_end(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_lateness_beside_its_rivals(tmp_path: Path) -> None:
     found = figures(tmp_path, "bench_lateness.py", "--seconds", 0.5, "--rate", 500, "--rate", 1000)
     for head in ("0.5 kHz", "1 kHz", "1 kHz, serial link"):
@@ -154,6 +157,7 @@ def test_lateness_beside_its_rivals(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_round_trips_beside_raw_ones(tmp_path: Path) -> None:
     found = figures(tmp_path, "bench_roundtrip.py", "--seconds", 0.5, "--rate", 200)
     assert found["serial, board in Python: exchanges otherwise than well"]["unit"] == "of 100"
@@ -163,6 +167,7 @@ def test_round_trips_beside_raw_ones(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_a_loop_killed_and_one_stopped(tmp_path: Path) -> None:
     found = figures(tmp_path, "bench_watchdog.py", "--moments", 1)
     for number in ("SIGKILL", "SIGSTOP"):
@@ -174,6 +179,7 @@ def test_a_loop_killed_and_one_stopped(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_endurance_in_short(tmp_path: Path) -> None:
     found = figures(tmp_path, "bench_endurance.py", "--hours", 0.002, "--wall", 0.05)
     for head in ("0.002 h virtual at 10 kHz", "0.05 min over serial at 1 kHz"):
@@ -183,6 +189,7 @@ def test_endurance_in_short(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_the_serial_link(tmp_path: Path) -> None:
     for _ in range(3):
         try:
@@ -209,8 +216,8 @@ def test_shapes_and_rivals(tmp_path: Path) -> None:
     density = 0.05 + 0.02 * rows + 0.01 * columns * (rows > 3)
     record = {}
     for name, volts in (("08", 800), ("1", 1000), ("11", 1100), ("15", 1500), ("19", 1900)):
-        u = volts * np.interp(np.arange(401), [0, 100, 300, 400], [0.0, 1.0, -1.0, 0.0])
-        moved = (regressors(plane, np.concatenate([[0.0], u, u])) @ density)[-401:]
+        u = volts * np.interp(np.arange(161), [0, 40, 120, 160], [0.0, 1.0, -1.0, 0.0])
+        moved = (regressors(plane, np.concatenate([[0.0], u, u])) @ density)[-161:]
         record |= {f"Vplus_{name}kv": u, f"Displacement_{name}kv": moved - moved[0]}
     (tmp_path / "piezo").mkdir()
     savemat(tmp_path / "piezo" / "MeasurementData.mat", record)
