@@ -102,7 +102,7 @@ def ready(folder: Path, example: str) -> list[str]:
     if words[0] == "trial":
         words[words.index("--cases") + 1] = "1"
     if words == ["hil", "configs/leuven.yaml"]:  # in full in test_hil.py
-        words += ["--seconds", "4", "--at-least", "5"]
+        words += ["--seconds", "4", "--at-least", "5", "--fault", "kill"]
     for word in words:
         if word.endswith("model.yaml"):
             (folder / word).write_bytes((folder / "model.yaml").read_bytes())
