@@ -1,11 +1,13 @@
-"""Recordings that others made, diagnosed: Silverbox, Bouc-Wen, EMPS.
+"""Recordings that others made, diagnosed: Silverbox, Bouc-Wen, EMPS, a DC motor.
 
     python tools/bench_benchmarks.py DATA --json benchmarks.json
 
-DATA holds `real/silverbox`, `real/bouc-wen`, `real/emps` (nonlinearbenchmark.org); what is not is skipped.
+DATA holds `real/silverbox`, `real/bouc-wen`, `real/emps` (nonlinearbenchmark.org), `real/dc-motor`; what it
+does not hold is skipped.
 The extended stage of Silverbox is simulated from the drive alone on a realisation left out. That of Bouc-Wen
 is simulated on a multisine of other phases against the equation with its true numbers, both by the
-same integrator at a fine rate.
+same integrator at a fine rate. Of the motor only the speed was measured; it is learned on the first two
+thirds.
 """
 
 from __future__ import annotations
@@ -36,6 +38,9 @@ SILVERBOX = {"mass": 5.34e-3, "viscous": 0.2253, "force_constant": 1.0, "voltage
 SPRING = {"name": "parallel-spring", "stiffness": 1019.0}
 BOUC_WEN = {"mass": 2.0, "viscous": 10.0, "force_constant": 1.0, "voltage_limit": 1000.0}
 TRUE = {"alpha": 5e4, "beta": 1e3, "gamma": 0.8, "delta": -1.1}
+MOTOR = {"axis": "rotary", "mass": 0.01, "force_constant": 1.0, "voltage_limit": 12.0}
+"""Of which only the inertia is believed, in units of its torque a volt."""
+RPM = 2.0 * np.pi / 60.0
 EMPS = {"mass": 95.1089, "viscous": 203.5, "force_constant": 35.1507, "voltage_limit": 10.0}
 
 
@@ -203,13 +208,49 @@ def emps(folder: Path, budget: float) -> list[Figure]:
     return [*figures, Figure("EMPS: direction-dependent viscous friction named", directed, "", ">= 1")]
 
 
+def motor(folder: Path) -> dict[str, Floats]:
+    """Return time (s), voltage and speed (rad/s) of the motor, and the position (rad) that it adds up to."""
+    path = folder / "run_minimal.csv"
+    read = np.genfromtxt(path, delimiter=",", names=True, usecols=(0, 1, 2))
+    time_s, speed = read["time"], read["rpm"] * RPM
+    steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(time_s)
+    position = np.append(0.0, np.cumsum(steps))
+    return {"time": time_s, "voltage": read["voltage"], "speed": speed, "position": position}
+
+
+def dc_motor(folder: Path, budget: float) -> list[Figure]:
+    """What its author found by hand, and the speed on the last third, simulated from the voltage alone."""
+    data = motor(folder)
+    rows = data["time"].size
+    learned = {k: data[k][: 2 * rows // 3] for k in ("time", "voltage", "position")}
+    found, seconds = timed(MOTOR, recording(learned), budget)
+    named = {n: e for e in found.effects for n in e.names}
+    wanted = {"drive-deadband"}, {"drive-offset", "constant-force"}, {"drive-delay", "sensor-delay"}
+    hits = float(sum(bool(one & named.keys()) for one in wanted))
+    delay = next((e.parameters["delay"].value for e in named.values() if "delay" in e.parameters), 0.0)
+    simulator = Simulator(found.stage.with_changes(sensor={"noise": 0.0, "resolution": 0.0}), seed=0)
+    reached = np.empty(rows)
+    for k, volts in enumerate(data["voltage"].tolist()):
+        reached[k] = simulator.measure()
+        simulator.advance(volts, float(data["time"][1] - data["time"][0]))
+    apart = np.abs(np.gradient(reached, data["time"]) - data["speed"]) / RPM
+    error = float(np.mean(apart[2 * rows // 3 :]))
+    note = f"{said(found)}; {seconds:.0f} s"
+    return [
+        Figure("DC motor: of dead zone, bias, delay named", hits, "of 3", ">= 3", note),
+        Figure("DC motor: delay, 0 where none is named", 1e3 * delay, "ms", "", "31 by its author"),
+        Figure("DC motor: mean error of speed, last third", error, "rpm", "<= 2.2", "2.2 by its author"),
+    ]
+
+
 @click.command()
 @click.argument("data", required=False, type=click.Path(path_type=Path))
 @click.option("--budget", default=60.0, show_default=True, help="Seconds for each diagnosis.")
 @click.option("--json", "path", type=click.Path(path_type=Path))
 def main(data: Path | None, budget: float, path: Path | None) -> None:
     figures: list[Figure] = []
-    for name, run in (("silverbox", silverbox), ("bouc-wen", bouc_wen), ("emps", emps)):
+    cases = (("silverbox", silverbox), ("bouc-wen", bouc_wen), ("emps", emps), ("dc-motor", dc_motor))
+    for name, run in cases:
         if data is None or not (data / "real" / name).is_dir():
             click.echo(f"{name} skipped: name the folder that holds real/{name}")
             continue

@@ -10,7 +10,7 @@ from rtcomp.kernels import Floats, compiled, summing
 
 
 @summing
-def _along(one: Floats, other: Floats, count: int) -> float:
+def _product(one: Floats, other: Floats, count: int) -> float:
     """Return the product of the first members of two rows."""
     total = 0.0
     for k in range(count):
@@ -37,12 +37,12 @@ def _free(gram: Floats, cross: Floats, state: np.ndarray, c: Floats) -> None:
                 right -= gram[i, j] * c[j]
         row = factor[count]
         for b in range(count):
-            row[b] = (gram[i, free[b]] - _along(row, factor[b], b)) / factor[b, b]
-        pivot = gram[i, i] - _along(row, row, count)
+            row[b] = (gram[i, free[b]] - _product(row, factor[b], b)) / factor[b, b]
+        pivot = gram[i, i] - _product(row, row, count)
         if not 0.0 < pivot < np.inf:
             raise np.linalg.LinAlgError("columns are alike, or hold no numbers")
         row[count] = math.sqrt(pivot)
-        aim[count] = (right - _along(row, aim, count)) / row[count]
+        aim[count] = (right - _product(row, aim, count)) / row[count]
         free[count] = i
         count += 1
     for a in range(count - 1, -1, -1):
@@ -92,7 +92,7 @@ def _stepwise(gram: Floats, cross: Floats, low: Floats, high: Floats, tolerance:
                 c[met] = low[met] if state[met] < 0 else high[met]
         best, most = -1, tolerance
         for i in range(size):
-            gain = state[i] * (_along(gram[i], c, size) - cross[i])
+            gain = state[i] * (_product(gram[i], c, size) - cross[i])
             if gain > most:
                 best, most = i, gain
         if best < 0:
@@ -124,7 +124,7 @@ def bounded_minimum(gram: Floats, cross: Floats, low: Floats, high: Floats) -> F
         _free(gram, cross, state, c)
         count = last = 0
         for i in range(size):
-            slope = _along(gram[i], c, size) - cross[i]
+            slope = _product(gram[i], c, size) - cross[i]
             wrong[i] = _wrong(state[i], c[i], slope, low[i], high[i], tolerance)
             if wrong[i] != 0:
                 count, last = count + 1, i

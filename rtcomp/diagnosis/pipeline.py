@@ -86,7 +86,7 @@ def _diagnosed(
     seed: int,
 ) -> Diagnosis:
     say: Progress = progress or (lambda _part, _what: None)
-    ends, compiled = clock.ends_at(budget, began), clock.compiling()
+    ends, compiling = clock.ends_at(budget, began), clock.compiling()
     say(0.0, "balance")
     objectives = _objectives(stage, recordings, held, ends - (1.0 - SEARCH) * budget)
     if clock.now() > ends:
@@ -118,8 +118,8 @@ def _diagnosed(
     notes = [BAND_LIMITED] if len(objectives) > 1 and not fitter.balance.data.held else []
     if done.position is not None:
         notes.append(STICKS.format(100.0 * untold(balance), done.position.seconds))
-    compiled = clock.compiling() - compiled
-    notes += [COMPILED.format(compiled)] if compiled > LONG else []
+    compiling = clock.compiling() - compiling
+    notes += [COMPILED.format(compiling)] if compiling > LONG else []
     notes += [f"not tried within {budget:g} s: {what}" for what in found.not_tried]
     return replace(done, notes=[*notes, *done.notes], not_tried=found.not_tried)
 

@@ -127,6 +127,16 @@ def test_a_stage_that_takes_hours_to_simulate_is_refused(good: Recording, change
         admit(stage(**changes), [good])
 
 
+@pytest.mark.parametrize("name", ["quadratic-drag", "viscous-friction"])
+def test_a_believed_effect_beyond_its_physical_bounds_is_refused(good: Recording, name: str) -> None:
+    """A file may hold it, for a simulation; no axis has it."""
+    drives = [{"name": name, "coefficient": -3.0}]
+    with pytest.raises(
+        ConfigError, match=rf"{name} has coefficient -3 .*; physical is \[0, 1e\+0\d\]; correct it"
+    ):
+        admit(stage(effects=drives), [good])
+
+
 def test_a_stage_that_runs_away_is_refused(good: Recording) -> None:
     spring = [{"name": "parallel-spring", "stiffness": -1e5}]
     with pytest.raises(ConfigError, match=r"its position is \S+ m 0\.\d+ s after the start"):

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
+from bench_benchmarks import MOTOR, motor
+from bench_benchmarks import recording as recording_of
 from recorded import STAGE, run, stage, there_and_back
 
 from rtcomp.diagnosis.admit import admit
 from rtcomp.diagnosis.pipeline import diagnose
-from rtcomp.recording.reader import Recording, read
+from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
@@ -49,21 +49,11 @@ def test_numbers_bent_to_a_part_of_the_recordings_are_not_given() -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not DATA.is_dir(), reason="measured and sealed recordings (../shared/data) are not here")
-def test_a_measured_motor_of_which_only_the_inertia_is_believed(tmp_path: Path) -> None:
+def test_a_measured_motor_of_which_only_the_inertia_is_believed() -> None:
     """Open loop, 100 Hz; the position is the integral of the measured speed."""
-    source = DATA / "real" / "dc-motor" / "run_minimal.csv"
-    table = np.genfromtxt(source, delimiter=",", names=True, usecols=(0, 1, 2))
-    time, voltage, speed = table["time"], table["voltage"], table["rpm"] * 2.0 * np.pi / 60.0
-    position = np.append(0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time)))
-    np.savetxt(
-        tmp_path / "motor.csv", np.column_stack([time, position, voltage]), delimiter=",",
-        header="time,position,voltage", comments="",
-    )  # fmt: skip
-    thin = Stage.from_dict(
-        {"stage": {**NEEDED, "axis": "rotary", "mass": 0.01, "force_constant": 1.0, "voltage_limit": 12.0},
-         "rate": 100.0}
-    )  # fmt: skip
-    motor = replace(read(tmp_path / "motor.csv"), path=Path("motor.csv"))
-    admit(thin, [motor])
-    found = diagnose(thin, [motor], budget=300.0)
+    columns = motor(DATA / "real" / "dc-motor")
+    thin = Stage.from_dict({"stage": MOTOR, "rate": 100.0})
+    turned = recording_of({name: columns[name] for name in ("time", "position", "voltage")})
+    admit(thin, [turned])
+    found = diagnose(thin, [turned], budget=300.0)
     assert found.verdict in ("missing-physics", "unexplained")

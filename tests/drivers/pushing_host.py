@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import subprocess
 import sys
 import time
@@ -18,6 +19,8 @@ from rtcomp.stage.stage import Stage
 
 RUNNING = b"running\n"
 SETTLED_TICKS = 20
+MOMENTS = int(os.environ.get("RTCOMP_TEST_MOMENTS", "40"))
+"""At which a host is killed or stopped in each proof."""
 
 
 @contextlib.contextmanager

@@ -7,7 +7,7 @@ import signal
 import time
 
 import pytest
-from pushing_host import pushing
+from pushing_host import MOMENTS, pushing
 from rtcomp_drivers.driver import Bench
 from rtcomp_drivers.plant_process import PlantProcess
 from rtcomp_drivers.registry import create
@@ -17,8 +17,6 @@ from rtcomp.loop.device import OK
 
 WATCHDOG_S = 0.1
 """The plant server's axis has this one."""
-MOMENTS = 40
-"""At which a host is killed or stopped; hundreds: tools/bench_watchdog.py."""
 SLACK_S = 0.25
 """For processes that wait for a processor on a busy machine; the axis' own clock knows none."""
 LEAD = 1e-3

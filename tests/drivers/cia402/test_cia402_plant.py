@@ -8,7 +8,7 @@ import threading
 import time
 
 import pytest
-from pushing_host import pushing
+from pushing_host import MOMENTS, pushing
 from rtcomp_drivers.cia402_states import State
 from rtcomp_drivers.driver import Bench
 from rtcomp_drivers.plant_process import PlantProcess
@@ -18,8 +18,6 @@ from rtcomp.errors import DeviceError, DeviceTimeoutError
 from rtcomp.loop.device import OK
 
 WATCHDOG_S = 0.1
-MOMENTS = 40
-"""At which a host is killed or stopped; hundreds: tools/bench_watchdog.py."""
 SLACK_S = 0.25
 """For processes that wait for a processor on a busy machine; the axis' own clock knows none."""
 
