@@ -126,9 +126,8 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
             )
             why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""
             if not why and more and fitter.by_force:
-                size = float(np.std(force_of(fitter, chosen, i)))
-                errors = errors_beside(fitter, chosen, forms)
-                other = rival(fitter, without, errors, size, chosen.entries[i])
+                force, errors = force_of(fitter, chosen, i), errors_beside(fitter, chosen, forms)
+                other = rival(fitter, without, errors, force, chosen.entries[i])
                 why = STANDS_IN.format(other) if other else ""
             elsewhere = not why and denied(fitter, chosen, without)
             if elsewhere:

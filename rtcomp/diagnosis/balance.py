@@ -92,7 +92,8 @@ class ForceBalance(Signals):
         if block is not None:
             other.blocks, other.block = int(block[-1]) + 1, block
             other._reserved = np.zeros(other.blocks, dtype=np.bool_)
-        other.believed_speed, other.level = self.believed_speed, self.level
+        other.believed_speed, other.speed_room = self.believed_speed, self.speed_room
+        other.level = self.level
         other._cache = Cache(KEPT_ONCE)
         if self._whitening is not None:
             other._weigh()

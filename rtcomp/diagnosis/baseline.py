@@ -23,6 +23,8 @@ SPEEDS = 9
 """Speeds below which micro-damping may act, where the belief has none."""
 STEPS = 4
 """Times that a believed speed is moved to where a fit has it, at most."""
+ROOM = 0.5
+"""Change of the speed's logarithm, where it is not believed, that a fit may make at a time."""
 SETTLED_SPEED = 2e-3
 """Relative change of that speed at which it is settled."""
 FINER = 3
@@ -60,11 +62,13 @@ def _damp(fitter: Fitter, terms: Sequence[Term]) -> None:
         return
     if balance.believed_speed is None:
         _search_speed(fitter, terms)
-        return
-    balance.damp_below(balance.believed_speed)  # a poorer model may have bent it
+    else:
+        balance.damp_below(balance.believed_speed)  # a poorer model may have bent it
     found = None
     for _ in range(STEPS):
         found = fitter.fit(terms, found)
+        if balance.believed_speed is None:
+            balance.speed_room = ROOM * float(found.coefficients[balance.faster - 1])
         speed, before = balance.speed_of(found.coefficients), balance.stage.mechanics.micro_damping_speed
         balance.damp_below(speed)
         if abs(np.log(speed / before)) < SETTLED_SPEED:

@@ -35,7 +35,7 @@ def prior_of(balance: ForceBalance, terms: Sequence[Term], system: System, *, of
             high[i] = 0.0
     low[0] = 1e-3 * m.mass
     if balance.believed_speed is None:
-        high[balance.faster] = 0.0
+        low[balance.faster], high[balance.faster] = -balance.speed_room, balance.speed_room
     else:
         off = math.log(balance.believed_speed / m.micro_damping_speed)
         mean[balance.faster], low[balance.faster] = m.micro_damping * off, -np.inf

@@ -140,6 +140,13 @@ def free_parameters(entry: Mapping[str, Any], *, linear: bool) -> list[Parameter
     return [p for p in own if (p in ruled) == linear]
 
 
+def shape_parameters(entry: Mapping[str, Any]) -> list[Parameter]:
+    """Return the parameters that the entry states and a fit moves, but for its sizes: what bends its law."""
+    kind = kind_of(entry)
+    own = [*free_parameters(entry, linear=True), *free_parameters(entry, linear=False)]
+    return [p for p in own if p.name not in kind.linear]
+
+
 def is_form(kind: type[Effect], p: Parameter) -> bool:
     """Tell whether a parameter says in which form an effect comes: it has a default and few values."""
     return p.choice or (p.default is not None and p.name in kind.search_grid)

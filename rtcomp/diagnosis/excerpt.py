@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import yields
 from rtcomp.diagnosis.data import RUN_IN, Data, Segment, way_to
 from rtcomp.diagnosis.fit import Fitter
@@ -17,15 +18,18 @@ UNITS = 12
 """Friction units that do to see from afar where a play is."""
 
 
-def excerpt(fitter: Fitter, model: Fitted) -> Fitter:
-    """Return the force balance on the blocks in which a model leaves most, none reserved.
+def excerpt(fitter: Fitter, model: Fitted) -> Fitter | None:
+    """Return the force balance on the blocks in motion in which a model leaves most, none reserved.
 
-    Each block is a segment of its own, with the way there, which friction remembers.
+    Each block is a segment of its own, with the way there, which friction remembers; None where nothing
+    moves.
     """
     b = fitter.balance
-    blocks = np.flatnonzero(fitter.use)
-    count = max(int(SHARE * blocks.size), FEWEST)
-    chosen = np.sort(blocks[np.argsort(-model.errors, kind="stable")[:count]])
+    used, moves = np.flatnonzero(fitter.use), moving(b)
+    some = [int(i) for i in np.argsort(-model.errors, kind="stable") if moves[used[i]]]
+    if not some:
+        return None
+    chosen = np.sort(used[some[: max(int(SHARE * used.size), FEWEST)]])
     segments, at = [], 0
     for segment in b.data.segments:
         rows = b.whitening.rows(segment)
@@ -33,10 +37,10 @@ def excerpt(fitter: Fitter, model: Fitted) -> Fitter:
         of_block = b.block[at : at + compared.size]
         at += compared.size
         for block in chosen:
-            some = compared[of_block == block]
-            if some.size:
+            own = compared[of_block == block]
+            if own.size:
                 segments.append(
-                    _around(b.whitening.lead, b.whitening.edge, segment, int(some[0]), int(some[-1]))
+                    _around(b.whitening.lead, b.whitening.edge, segment, int(own[0]), int(own[-1]))
                 )
     data = Data(tuple(segments), b.data.rate, b.data.held, b.data.averaged)
     sizes = [len(range(*b.whitening.rows(s).indices(s.time.size))) for s in segments]
@@ -44,6 +48,13 @@ def excerpt(fitter: Fitter, model: Fitted) -> Fitter:
     other.offset = fitter.offset
     other.balance.put(b.reaches, b.step)
     return other
+
+
+def moving(balance: ForceBalance) -> np.ndarray:
+    """Tell in which blocks, (B,) bool, the position goes further than noise makes it."""
+    x = balance.plain([s.position for s in balance.data.segments])
+    went = [float(np.std(x[balance.block == block])) for block in range(balance.blocks)]
+    return np.array(went) > 2.0 * balance.noise.rms
 
 
 def with_few_units(fitter: Fitter, model: Fitted) -> Fitter:

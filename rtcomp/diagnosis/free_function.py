@@ -11,12 +11,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.fitted import Fitted
 from rtcomp.diagnosis.locate import axes_of
-from rtcomp.diagnosis.other_forms import errors_beside, of_position
+from rtcomp.diagnosis.other_forms import SMOOTH, errors_beside, of_position
 from rtcomp.diagnosis.significance import log_gain
 from rtcomp.diagnosis.where import Compared, as_white
 from rtcomp.kernels import Floats
@@ -25,22 +26,34 @@ KNOTS = 16
 """Knots of a function at quantiles of what it goes by, joined by straight lines."""
 
 
-def rival(fitter: Fitter, without: Fitted, errors: Floats, size: float, entry: Entry) -> str:
+def rival(fitter: Fitter, without: Fitted, errors: Floats, force: Floats, entry: Entry) -> str:
     """Return what a force goes by that explains more than an effect, "" where there is none.
 
     It stands in the place of the effect, an `entry`, beside the model `without` that. `errors` (B_use,) are
-    those of the effect in any form, `size` (N) its rms, which the function is believed to have too. A spring
-    by any law is a spring: of what is a smooth function of the position, another one is a form.
+    those of the effect in any form, `force` (N, (n,)) is its own, as large as which the function is believed
+    to be. A spring by any law is a spring: of what is a smooth function of the position, another one is a
+    form. And of a law that no number bends, as a damping by direction, what explains more is a further effect.
     """
+    size = float(np.std(force))
     if not np.isfinite(size) or size == 0.0:
         return ""
+    balance = fitter.balance
+    own = None if ent.shape_parameters(entry) else as_white(balance, force)
     gains = {
         name: log_gain(errors, errors_beside(fitter, without, size * columns))
-        for name, columns in _functions(fitter.balance)
-        if name != "position" or not of_position(fitter.balance, entry).size
+        for name, columns in _functions(balance)
+        if not (name == "position" and of_position(balance, entry).size) and not _one_of(columns, own)
     }
-    best = max(gains, key=lambda name: gains[name])
-    return best if gains[best] > 0.0 else ""
+    best = max(gains, key=lambda name: gains[name], default="")
+    return best if best and gains[best] > 0.0 else ""
+
+
+def _one_of(columns: Floats, law: Floats | None) -> bool:
+    """Tell whether a law (n,) is one of the functions that whitened columns (q, n) span."""
+    if law is None:
+        return False
+    rest = law - np.linalg.lstsq(columns.T, law, rcond=None)[0] @ columns
+    return bool(np.linalg.norm(rest) < SMOOTH * np.linalg.norm(law))
 
 
 def _functions(balance: ForceBalance) -> Iterator[tuple[str, Floats]]:

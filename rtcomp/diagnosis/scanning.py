@@ -39,9 +39,11 @@ def scanned(fitter: Fitter, model: Fitted, term: Term, ends: float) -> list[Term
     How a load meets the ends of its play decides which length fits: lengths and frequencies are looked
     through together, on a part of the balance. From the best the least is looked for by simplex (Nelder and
     Mead 1965, Computer Journal 7(4)): what leaves when the load is met a little earlier has no useful slope.
-    None where the model fits best without.
+    None where the model fits best without, or nothing moves.
     """
     some = excerpt(fitter, model)
+    if some is None:
+        return []
     length = next(p.name for p in ent.free_parameters(term.entry, linear=False) if p.unit == "m")
     stated = [p for p in ent.kind_of(term.entry).parameters if p.default is not None]
     names = [*(p.name for p in stated), length]

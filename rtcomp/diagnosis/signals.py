@@ -63,6 +63,8 @@ class Signals:
         m = stage.mechanics
         self.believed_speed = m.micro_damping_speed if m.micro_damping > 0.0 else None
         """Speed (m/s) below which micro-damping is believed to act, None where there is no such belief."""
+        self.speed_room = 0.0
+        """N s/m, up to which the column of that speed goes where none is believed: first order ends there."""
 
     @property
     def believed_reaches(self) -> Floats:
@@ -87,7 +89,7 @@ class Signals:
     def speed_of(self, c: Floats) -> float:
         """Return the speed (m/s) of micro-damping that coefficients `c` of the base tell."""
         now, damping = self.stage.mechanics.micro_damping_speed, float(c[self.faster - 1])
-        if damping <= 0.0 or self.believed_speed is None:
+        if damping <= 0.0:
             return now
         change = float(np.clip(c[self.faster] / damping, -FURTHEST, FURTHEST))
         return now * float(np.exp(change))

@@ -15,7 +15,7 @@ from recorded import RATE, STAGE, changed, cut, run, stage, there_and_back
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
+from rtcomp.diagnosis.baseline import baseline, settle
 from rtcomp.diagnosis.blocks import reserved_blocks
 from rtcomp.diagnosis.candidates import started
 from rtcomp.diagnosis.data import MOST_ROWS, load_data
@@ -260,6 +260,22 @@ def test_friction_that_nobody_believes_is_found_to_the_noise() -> None:
     whole = float(known.power), float(open_to_all.power)
     assert found.sse / whole[1] < 4.0 * right.sse / whole[0] + 1e-4
     assert found.coefficients[0] == pytest.approx(2.0, rel=0.03)
+
+
+@pytest.mark.parametrize("speed", [1.0e-3, 1.5e-3])
+def test_a_speed_of_micro_damping_that_nobody_believes_moves_with_the_effects(speed: float) -> None:
+    """One after the other, it and a fall of friction at much the same speed crawl, and end far off."""
+    falls = {"name": "stribeck", "rise": 0.3, "velocity": 8e-4}
+    true = stage(effects=[falls], micro_damping=2000.0, micro_damping_speed=speed)
+    thin = {**STAGE, "stage": {k: STAGE["stage"][k] for k in ("mass", "force_constant", "voltage_limit")}}
+    balance = ForceBalance(Stage.from_dict(thin), load_data([run(true, there_and_back(20.0))]))
+    base, fitter = baseline(balance), Fitter(balance)
+    model = fitter.fit([Term.of({**falls, "rise": 0.1, "velocity": 3e-4})], base)
+    settle(fitter, model.terms)
+    model = fitter.fit(model.terms, model)
+    assert balance.stage.mechanics.micro_damping_speed == pytest.approx(speed, rel=0.02)
+    assert model.entries[0]["rise"] == pytest.approx(falls["rise"], rel=0.05)
+    assert model.entries[0]["velocity"] == pytest.approx(falls["velocity"], rel=0.05)
 
 
 def test_a_fit_stays_within_the_range_of_its_form() -> None:

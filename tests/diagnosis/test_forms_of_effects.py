@@ -15,7 +15,7 @@ from rtcomp.diagnosis.data import load_data
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.free_function import rival
-from rtcomp.diagnosis.other_forms import errors_beside, overtones
+from rtcomp.diagnosis.other_forms import errors_beside, force_of, overtones
 from rtcomp.diagnosis.screening import Screen, Screened, look
 from rtcomp.diagnosis.where import as_white
 
@@ -141,8 +141,26 @@ def test_a_force_that_goes_by_one_thing_by_an_unknown_law_is_a_rival_of_a_name()
         period = 1.0e-4 if found else 3.0e-4
         model = fitter.fit([Term.of({**wave, "period": period})], base)
         errors = errors_beside(fitter, model, overtones(fitter, model, model.entries[0]))
-        found.append(rival(fitter, base, errors, 0.5, model.entries[0]))
+        found.append(rival(fitter, base, errors, force_of(fitter, model, 0), model.entries[0]))
     assert found == ["position", ""]
+
+
+def test_what_goes_by_speed_beside_a_law_of_speed_that_no_number_bends_is_a_further_effect() -> None:
+    """A damping by direction stays one where a hump over speed is missing too; a fall with speed does not."""
+    damped = {"name": "asymmetric-viscous-friction", "ratio": 0.5}
+    falls = {"name": "stribeck", "rise": 0.2, "velocity": 3e-4}
+    believed, found = stage(viscous=400.0), []
+    for entry, there, hump in ((damped, [damped], 0.3), (falls, [], 1.0)):
+        recording = run(stage(viscous=400.0, effects=there), there_and_back(20.0))
+        v = np.gradient(recording.position, recording.time)
+        fast = float(np.quantile(np.abs(v), 0.9))
+        force = hump * np.sign(v) * np.exp(-(((np.abs(v) - 0.5 * fast) / (0.1 * fast)) ** 2))
+        pushed = {**recording.columns, "voltage": recording.voltage + force / believed.force_constant}
+        balance = ForceBalance(believed, load_data([replace(recording, columns=pushed)]))
+        base, fitter = baseline(balance), Fitter(balance)
+        model = fitter.fit([Term.of(entry)], base)
+        found.append(rival(fitter, base, model.errors, force_of(fitter, model, 0), model.entries[0]))
+    assert found == ["", "speed"]
 
 
 @pytest.mark.parametrize(("times", "harmonics"), [(1.8, 0), (2.6, 2), (4.4, 4)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from rtcomp.diagnosis import clock
 from rtcomp.diagnosis.balance import ForceBalance
 from rtcomp.diagnosis.baseline import baseline
 from rtcomp.diagnosis.data import load_data
+from rtcomp.diagnosis.excerpt import excerpt, moving
 from rtcomp.diagnosis.fit import Fitter
 from rtcomp.diagnosis.free import Term
 from rtcomp.diagnosis.growing import grow
@@ -153,3 +155,18 @@ def test_a_spring_and_a_weight_behind_a_play_are_fitted_with_it() -> None:
     assert found.entries[0]["gap"] == pytest.approx(PLAY["gap"], rel=0.05)
     assert found.entries[1]["force"] == pytest.approx(weight["force"], rel=0.05)
     assert right.sse < 1e-4 * base.sse and found.sse < 1e-3 * base.sse
+
+
+def test_a_play_is_looked_for_where_the_axis_moves() -> None:
+    """A drive that the friction of a thin belief does not hold leaves most where nothing moves."""
+    reference = 1e-3 * np.interp(np.arange(24000) / 1000.0, [0.0, 5.0, 19.0, 24.0], [0.0, 1.0, 1.0, 2.0])
+    recording = run(stage(), reference)
+    balance = ForceBalance(stage(), load_data([recording]))
+    base, fitter = baseline(balance), Fitter(balance)
+    moves = moving(balance)[fitter.use]
+    assert moves.any()
+    assert not moves.all()
+    most_at_rest = replace(base, errors=np.where(moves, 1.0, 1e6) * base.errors)
+    part = excerpt(fitter, most_at_rest)
+    assert part is not None
+    assert moving(part.balance).all()
