@@ -32,7 +32,8 @@ def rival(fitter: Fitter, without: Fitted, errors: Floats, force: Floats, entry:
     It stands in the place of the effect, an `entry`, beside the model `without` that. `errors` (B_use,) are
     those of the effect in any form, `force` (N, (n,)) is its own, as large as which the function is believed
     to be. A spring by any law is a spring: of what is a smooth function of the position, another one is a
-    form. And of a law that no number bends, as a damping by direction, what explains more is a further effect.
+    form. And beside a law that no number bends, as a damping by direction, what explains more is a further
+    effect.
     """
     size = float(np.std(force))
     if not np.isfinite(size) or size == 0.0:

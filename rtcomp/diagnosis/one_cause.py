@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -19,6 +20,11 @@ from rtcomp.units import for_axis, power_of
 FORCE, LENGTH = "N", "m"
 OFF = np.geomspace(1e-3, BELIEF_SD, 20)
 """How far numbers of a belief may be off each by itself, relative (standard deviations, equally likely)."""
+WRONG = 1.0
+"""How far a number is off, in its logarithm (standard deviation), that is not off but wrong: the reach of a
+friction of another shape, a mass without its load. One in 1 / LEVEL is."""
+MOST_WRONG = 3
+"""Numbers of a belief that may be wrong at once."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +46,8 @@ def one_cause(numbers: Numbers, fixed: Iterable[str]) -> Cause | None:
 
     A recording of voltage and position says nothing of the unit of force, which is a force constant, nor of
     that of length, which is a scale of the sensor: all numbers that have it move by its factor. Marginal
-    likelihoods of the logarithms tell one cause from many: beside a factor, a belief is off by less.
+    likelihoods of the logarithms tell one cause from many: beside a factor, a belief is off by less. Any
+    number may be wrong besides (contaminated normal law: Tukey 1960), which says nothing of the others.
     Something of the belief that cannot move is measured in the units that are `fixed`.
     """
     known = (numbers.before > 0.0) & (numbers.values > 0.0)
@@ -49,7 +56,7 @@ def one_cause(numbers: Numbers, fixed: Iterable[str]) -> Cause | None:
     sd = numbers.half[known] / WIDE / values
     causes = [unit for unit in (FORCE, LENGTH) if unit not in set(fixed)]
     powers = [np.array([power_of(unit, u) for u in numbers.units], dtype=float)[known] for unit in causes]
-    each = np.mean([_likelihood(moved, sd, off, np.zeros(moved.size))[0] for off in OFF])
+    each = float(_likelihoods(moved, sd, np.zeros(moved.size))[0].sum())
     found = [_by_factor(moved, sd, -power) for power in powers]
     total = each + sum(likelihood for likelihood, _, _ in found)
     if not total > 0.0:
@@ -84,22 +91,26 @@ def force_constant(believed: Stage, cause: Cause) -> Retuned:
 
 
 def _by_factor(moved: Floats, sd: Floats, power: Floats) -> tuple[float, float, float]:
-    """Return likelihood, and mean and standard deviation of the logarithm of a factor, over all of `OFF`."""
-    found = np.array([_likelihood(moved, sd, off, power) for off in OFF])
-    weight = found[:, 0] / max(float(found[:, 0].sum()), 1e-300)
-    mean = float(weight @ found[:, 1])
-    spread = float(weight @ (found[:, 2] + (found[:, 1] - mean) ** 2))
-    return float(found[:, 0].mean()), mean, math.sqrt(spread)
+    """Return likelihood, and mean and standard deviation of the logarithm of a factor."""
+    likelihood, mean, variance = _likelihoods(moved, sd, power)
+    total = float(likelihood.sum())
+    weight = likelihood / max(total, 1e-300)
+    centre = float(np.sum(weight * mean))
+    return total, centre, math.sqrt(float(np.sum(weight * (variance + (mean - centre) ** 2))))
 
 
-def _likelihood(moved: Floats, sd: Floats, off: float, power: Floats) -> tuple[float, float, float]:
-    """Return the density of what `moved`, and mean and variance of the factor's logarithm given that.
+def _likelihoods(moved: Floats, sd: Floats, power: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return density of what `moved` times prior, and mean and variance of the factor's logarithm given that.
 
-    Numbers are known to `sd`, a belief is `off` by itself, and by a factor of BELIEF_SD to these powers.
+    For each of `OFF` and each choice of numbers that are wrong, (O, C). Numbers are known to `sd` (q,), and
+    a factor whose logarithm has the standard deviation BELIEF_SD moves them by these powers (q,).
     """
-    variance = sd**2 + off**2
-    told = 1.0 / BELIEF_SD**2 + float(np.sum(power**2 / variance))
-    mean = float(np.sum(power * moved / variance)) / told
-    square = float(np.sum(moved**2 / variance)) - mean**2 * told
-    determinant = float(np.sum(np.log(variance))) + math.log(told * BELIEF_SD**2)
-    return math.exp(-0.5 * (square + determinant)), mean, 1.0 / told
+    some = [c for k in range(MOST_WRONG + 1) for c in combinations(range(moved.size), k)]
+    wrong = np.array([np.isin(np.arange(moved.size), c) for c in some])
+    prior = np.where(wrong, LEVEL, 1.0 - LEVEL).prod(axis=1) / OFF.size
+    variance = sd**2 + np.where(wrong, WRONG, OFF[:, None, None]) ** 2
+    told = 1.0 / BELIEF_SD**2 + np.sum(power**2 / variance, axis=-1)
+    mean = np.sum(power * moved / variance, axis=-1) / told
+    square = np.sum(moved**2 / variance, axis=-1) - mean**2 * told
+    determinant = np.sum(np.log(variance), axis=-1) + np.log(told * BELIEF_SD**2)
+    return prior * np.exp(-0.5 * (square + determinant)), mean, 1.0 / told

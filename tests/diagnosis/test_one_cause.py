@@ -64,6 +64,24 @@ def test_numbers_that_moved_each_by_itself_are_no_unit(off: float) -> None:
     assert sum(cause is not None for cause in found) <= 10
 
 
+@pytest.mark.parametrize("wrong", [0.2, 0.4, 3.0])
+@pytest.mark.parametrize("at", range(5))
+def test_one_number_that_is_wrong_is_no_unit(at: int, wrong: float) -> None:
+    """As the reach of a friction of another shape: what it moved by says nothing of the others."""
+    chance = np.random.default_rng(9)
+    for off in (0.0, 0.02, 0.1):
+        relative = np.exp(off * chance.standard_normal(5))
+        relative[at] *= wrong
+        assert one_cause(numbers(relative, half=0.01), []) is None
+
+
+def test_a_unit_is_told_beside_a_number_that_is_wrong() -> None:
+    relative = 1.2**LENGTH
+    relative[4] *= 0.4
+    found = one_cause(numbers(relative, half=0.005), [])
+    assert found is not None and found.unit == "m" and found.low < 1.2 < found.high
+
+
 @pytest.mark.parametrize(
     "told",
     [
