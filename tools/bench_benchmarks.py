@@ -22,10 +22,10 @@ import click
 import numpy as np
 from figures_table import Figure, show
 
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.data import load_data
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.pipeline import diagnose
+from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.result import Diagnosis
 from rtcomp.kernels import Floats
 from rtcomp.recording.reader import Recording

@@ -16,12 +16,12 @@ import click
 import numpy as np
 from figures_table import Figure, show
 
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.data import load_data
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.pipeline import diagnose
+from rtcomp.diagnosis.positions.windows import Windows
+from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.result import Diagnosis
-from rtcomp.diagnosis.windows import Windows
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.demo import shipped
 from rtcomp.jobs.simulate import on_reference

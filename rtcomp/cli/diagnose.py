@@ -75,8 +75,8 @@ def diagnose(
     from dataclasses import replace
 
     began = time.monotonic()  # reading the recordings is part of the budget
-    from rtcomp.diagnosis.admit import admit
-    from rtcomp.diagnosis.readings import in_si_units
+    from rtcomp.diagnosis.forces.readings import in_si_units
+    from rtcomp.diagnosis.recordings.admit import admit
     from rtcomp.recording.acted import as_acted
     from rtcomp.recording.driven import driven
     from rtcomp.recording.reader import read

@@ -9,26 +9,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rtcomp.diagnosis import clock
-from rtcomp.diagnosis.answer import Rest, answer
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline, settle, with_offset
-from rtcomp.diagnosis.confidence import alternatives
+from rtcomp.diagnosis.candidates.growing import in_better_form
+from rtcomp.diagnosis.candidates.screening import Look, look
 from rtcomp.diagnosis.cores import shared
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.fitted import Fitted
-from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.growing import in_better_form
-from rtcomp.diagnosis.locate import locate
-from rtcomp.diagnosis.noise import Noise
+from rtcomp.diagnosis.fitting.baseline import baseline, settle, with_offset
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.fitted import Fitted
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.forces.noise import Noise
+from rtcomp.diagnosis.forces.sticking import untold
+from rtcomp.diagnosis.mismatch.locate import locate
+from rtcomp.diagnosis.mismatch.where import Compared, as_force
+from rtcomp.diagnosis.positions.hidden import MUCH, hides
+from rtcomp.diagnosis.positions.trajectory import Trajectory
+from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.result import Diagnosis, Place
-from rtcomp.diagnosis.screening import Look, look
-from rtcomp.diagnosis.selection import LOOKED, Search, search, until
+from rtcomp.diagnosis.search.confidence import alternatives
+from rtcomp.diagnosis.search.selection import LOOKED, Search, search, until
 from rtcomp.diagnosis.settings import BUDGET, LEAST_GAIN, LEFT
-from rtcomp.diagnosis.sticking import MUCH, hides, untold
-from rtcomp.diagnosis.trajectory import Trajectory
-from rtcomp.diagnosis.validation import Reserved
-from rtcomp.diagnosis.where import Compared, as_force
+from rtcomp.diagnosis.verdict.answer import Rest, answer
+from rtcomp.diagnosis.verdict.validation import Reserved
 from rtcomp.errors import RtcompError
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage

@@ -12,11 +12,11 @@ from every_effect import every
 from test_effect_balance import FRICTION, PLAIN, recorded, stage_with
 
 from rtcomp import physics
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline, settle
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.fitting.baseline import baseline, settle
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.recording.reader import Recording
 
 NEARLY = {"backlash": 0.04}  # the fit has the load's own motion behind the play, the stage its kernel

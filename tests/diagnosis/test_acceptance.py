@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from recorded import run, stage, there_and_back
 
-from rtcomp.diagnosis.acceptance import accepted, doubts
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.significance import Null
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.numerics.significance import Null
+from rtcomp.diagnosis.recordings.data import load_data
+from rtcomp.diagnosis.search.acceptance import accepted, doubts
 
 STRIBECK = {"name": "stribeck", "rise": 0.4, "velocity": 1e-3}
 BY_LOAD = {"name": "load-dependent-friction", "form": "linear", "stiffening": 1.0}

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recorded import changed, cut, of_axis, run, stage, there_and_back
 
-from rtcomp.diagnosis.admit import admit
-from rtcomp.diagnosis.excitation import reversals
+from rtcomp.diagnosis.recordings.admit import admit
+from rtcomp.diagnosis.recordings.excitation import reversals
 from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.recording.reader import Recording, read
 from rtcomp.stage.stage import Stage

@@ -7,12 +7,12 @@ import pytest
 from recorded import run, stage, there_and_back
 
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.at_hand import system_around
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.fitting.at_hand import system_around
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.errors import ConfigError
 from rtcomp.physics import Place, catalogue
 

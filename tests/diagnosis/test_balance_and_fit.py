@@ -14,20 +14,20 @@ from hypothesis import strategies as st
 from recorded import RATE, STAGE, changed, cut, run, stage, there_and_back
 
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline, settle
-from rtcomp.diagnosis.blocks import reserved_blocks
-from rtcomp.diagnosis.candidates import started
-from rtcomp.diagnosis.data import MOST_ROWS, load_data
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.regression import Grams
-from rtcomp.diagnosis.replicate import replicate
-from rtcomp.diagnosis.scales import tones_of
-from rtcomp.diagnosis.screening import look
-from rtcomp.diagnosis.stage_of import stage_of
-from rtcomp.diagnosis.validation import Reserved
-from rtcomp.diagnosis.where import as_force, as_seen, noise_seen
+from rtcomp.diagnosis.candidates.effects import started
+from rtcomp.diagnosis.candidates.scales import tones_of
+from rtcomp.diagnosis.candidates.screening import look
+from rtcomp.diagnosis.fitting.baseline import baseline, settle
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.fitting.stage_of import stage_of
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.forces.blocks import reserved_blocks
+from rtcomp.diagnosis.forces.replicate import replicate
+from rtcomp.diagnosis.mismatch.where import as_force, as_seen, noise_seen
+from rtcomp.diagnosis.numerics.regression import Grams
+from rtcomp.diagnosis.recordings.data import MOST_ROWS, load_data
+from rtcomp.diagnosis.verdict.validation import Reserved
 from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.physics import Effect, catalogue
 from rtcomp.stage.balance import between_rows

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear, nnls
 
-from rtcomp.diagnosis.bounded import bounded_minimum
+from rtcomp.diagnosis.numerics.bounded import bounded_minimum
 
 
 @settings(max_examples=40, deadline=None)

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from recorded import RATE, run, stage, there_and_back
 
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.candidates import candidates
-from rtcomp.diagnosis.confidence import explains_another
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.scales import Scales
+from rtcomp.diagnosis.candidates.effects import candidates
+from rtcomp.diagnosis.candidates.scales import Scales
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.recordings.data import load_data
+from rtcomp.diagnosis.search.confidence import explains_another
 from rtcomp.kernels import Floats
 
 WAVE = {"name": "cogging", "amplitude": 0.4, "period": 1.3e-4, "phase": 0.4}

@@ -10,11 +10,11 @@ from recorded import run, stage, there_and_back
 from test_trajectory import LOAD, balanced, both
 from test_trajectory import stage as pendulum
 
-from rtcomp.diagnosis.confirmed import denied, errors, shows, there
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.trajectory import Trajectory
-from rtcomp.diagnosis.windows import Windows
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.positions.trajectory import Trajectory
+from rtcomp.diagnosis.positions.windows import Windows
+from rtcomp.diagnosis.search.confirmed import denied, errors, shows, there
 
 COGGING = {"name": "cogging", "amplitude": 0.4, "period": 1.3e-4, "phase": 0.4}
 

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from recorded import run, stage, there_and_back
 
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.curves import Curve, left_over
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.mismatch.curves import Curve, left_over
+from rtcomp.diagnosis.mismatch.where import curves
+from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.result import Place
-from rtcomp.diagnosis.where import curves
 
 COGGING = {"name": "cogging", "amplitude": 0.4, "period": 1e-4, "phase": 0.5}
 DEADBAND = {"name": "drive-deadband", "width": 0.2}

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtcomp.diagnosis.replicate import followed
+from rtcomp.diagnosis.forces.replicate import followed
 from rtcomp.jobs.configuration import Configuration
 from rtcomp.jobs.simulate import on_reference
 from rtcomp.stage.stage import Stage

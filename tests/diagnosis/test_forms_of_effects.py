@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from recorded import run, stage, there_and_back
 
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.free_function import rival
-from rtcomp.diagnosis.other_forms import errors_beside, force_of, overtones
-from rtcomp.diagnosis.screening import Screen, Screened, look
-from rtcomp.diagnosis.where import as_white
+from rtcomp.diagnosis.candidates.screening import Screen, Screened, look
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.fitting.other_forms import errors_beside, force_of, overtones
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.mismatch.where import as_white
+from rtcomp.diagnosis.recordings.data import load_data
+from rtcomp.diagnosis.search.free_function import rival
 
 
 @pytest.mark.parametrize("name", ["cogging", "torque-ripple", "position-dependent-friction"])

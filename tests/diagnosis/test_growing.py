@@ -10,15 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from recorded import run, stage, there_and_back
 
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.growing import grow
+from rtcomp.diagnosis.candidates.growing import grow
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.fitting.starting import FULL, STARTS, as_they_are
+from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.pipeline import least_left
-from rtcomp.diagnosis.selection import look
-from rtcomp.diagnosis.starting import FULL, STARTS, as_they_are
+from rtcomp.diagnosis.recordings.data import load_data
+from rtcomp.diagnosis.search.selection import look
 
 STRIBECK = {"name": "stribeck", "rise": 0.4, "velocity": 1.5e-3}
 

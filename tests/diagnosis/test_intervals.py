@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from recorded import RATE, run, stage, there_and_back
 
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.intervals import numbers, told
-from rtcomp.diagnosis.spread import MODEL
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.fitting.intervals import numbers, told
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.numerics.spread import MODEL
+from rtcomp.diagnosis.recordings.data import load_data
 
 
 @pytest.mark.parametrize(("bursts", "least", "most"), [(1, 3.0, 30.0), (10, 0.0, 2.0)])

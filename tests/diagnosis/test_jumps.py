@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtcomp.diagnosis.data import MOST_ROWS, RUN_IN, WINDOWS, load_data, with_rows
-from rtcomp.diagnosis.jumps import jumps
+from rtcomp.diagnosis.recordings.data import MOST_ROWS, RUN_IN, WINDOWS, load_data, with_rows
+from rtcomp.diagnosis.recordings.jumps import jumps
 from rtcomp.recording.outliers import answers, outliers
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.lowpass import zero_phase

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from recorded import STAGE
 
-from rtcomp.diagnosis.locate import _since_reversal, axes_of, locate
+from rtcomp.diagnosis.mismatch.locate import _since_reversal, axes_of, locate
 from rtcomp.diagnosis.result import Place
 from rtcomp.kernels import Floats
 from rtcomp.stage.lowpass import zero_phase

@@ -7,10 +7,10 @@ import pytest
 from recorded import run, there_and_back
 from recorded import stage as axis
 
-from rtcomp.diagnosis.one_cause import Cause, fixed_units, force_constant, one_cause
+from rtcomp.diagnosis.fitting.retuned import Numbers
+from rtcomp.diagnosis.fitting.stage_of import in_units, with_effect
 from rtcomp.diagnosis.pipeline import diagnose
-from rtcomp.diagnosis.retuned import Numbers
-from rtcomp.diagnosis.stage_of import in_units, with_effect
+from rtcomp.diagnosis.verdict.one_cause import Cause, fixed_units, force_constant, one_cause
 from rtcomp.kernels import Floats
 from rtcomp.stage.simulate import Simulator
 from rtcomp.stage.stage import Stage

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtcomp.diagnosis.periodogram import FINE, peak_near, periodogram
+from rtcomp.diagnosis.numerics.periodogram import FINE, peak_near, periodogram
 
 
 @settings(max_examples=20, deadline=None)

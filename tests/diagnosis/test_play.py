@@ -10,16 +10,16 @@ import pytest
 from recorded import STAGE, run, stage, there_and_back
 
 from rtcomp.diagnosis import clock
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.excerpt import excerpt, moving
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.growing import grow
-from rtcomp.diagnosis.play import Load, behind_play
-from rtcomp.diagnosis.scanning import scanned
-from rtcomp.diagnosis.selection import look
+from rtcomp.diagnosis.candidates.excerpt import excerpt, moving
+from rtcomp.diagnosis.candidates.growing import grow
+from rtcomp.diagnosis.candidates.scanning import scanned
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.forces.play import Load, behind_play
+from rtcomp.diagnosis.recordings.data import load_data
+from rtcomp.diagnosis.search.selection import look
 from rtcomp.stage.balance import force_balance, zero_phase
 from rtcomp.stage.stage import Stage
 

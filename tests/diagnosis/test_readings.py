@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recorded import RATE, changed, run, stage, there_and_back
 
-from rtcomp.diagnosis.admit import admit
-from rtcomp.diagnosis.readings import in_si_units
+from rtcomp.diagnosis.forces.readings import in_si_units
+from rtcomp.diagnosis.recordings.admit import admit
 from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage

@@ -8,14 +8,14 @@ from recorded import run, there_and_back
 from recorded import stage as axis
 from scipy.signal import lfilter
 
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.intervals import numbers as numbers_of
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.intervals import numbers as numbers_of
+from rtcomp.diagnosis.fitting.retuned import retunings, widening
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.numerics.spread import elsewhere, scatter
 from rtcomp.diagnosis.pipeline import diagnose
-from rtcomp.diagnosis.retuned import retunings, widening
-from rtcomp.diagnosis.spread import elsewhere, scatter
+from rtcomp.diagnosis.recordings.data import load_data
 
 
 def test_blocks_left_out_tell_how_uncertain_a_mean_is() -> None:

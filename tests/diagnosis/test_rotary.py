@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 from recorded import STAGE, run, stage, there_and_back
 
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.candidates import candidates
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.candidates.effects import candidates
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.pipeline import diagnose
+from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.stage.stage import Stage
 
 

@@ -13,18 +13,18 @@ from hypothesis import strategies as st
 from recorded import run, stage, there_and_back
 
 from rtcomp.diagnosis import clock
-from rtcomp.diagnosis.acceptance import doubts
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.candidates import Candidate, candidates
-from rtcomp.diagnosis.confidence import above_noise
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.replicates import gain_in_full, null_of
-from rtcomp.diagnosis.screening import Screen
-from rtcomp.diagnosis.selection import Search
-from rtcomp.diagnosis.significance import Null, confidence_set, log_gain, probabilities
+from rtcomp.diagnosis.candidates.effects import Candidate, candidates
+from rtcomp.diagnosis.candidates.screening import Screen
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.numerics.significance import Null, confidence_set, log_gain, probabilities
+from rtcomp.diagnosis.recordings.data import load_data
+from rtcomp.diagnosis.search.acceptance import doubts
+from rtcomp.diagnosis.search.confidence import above_noise
+from rtcomp.diagnosis.search.replicates import gain_in_full, null_of
+from rtcomp.diagnosis.search.selection import Search
 
 
 def test_gains_are_those_of_refits_without_each_block() -> None:

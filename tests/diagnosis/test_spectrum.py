@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtcomp.diagnosis.spectrum import filtered, motion_spectrum, spectrum
+from rtcomp.diagnosis.numerics.spectrum import filtered, motion_spectrum, spectrum
 from rtcomp.kernels import Floats
 
 

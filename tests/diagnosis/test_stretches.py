@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from recorded import RATE, changed, run, stage, there_and_back
 
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.stretches import BRIDGED, LEAST_ROWS, MOST, stretches
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.recordings.data import load_data
+from rtcomp.diagnosis.recordings.stretches import BRIDGED, LEAST_ROWS, MOST, stretches
 from rtcomp.recording.reader import Recording
 
 

@@ -9,8 +9,8 @@ from bench_benchmarks import MOTOR, motor
 from bench_benchmarks import recording as recording_of
 from recorded import STAGE, run, stage, there_and_back
 
-from rtcomp.diagnosis.admit import admit
 from rtcomp.diagnosis.pipeline import diagnose
+from rtcomp.diagnosis.recordings.admit import admit
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
 

@@ -11,18 +11,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from recorded import measured
 
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.belief import Belief
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.free import Term
-from rtcomp.diagnosis.other_forms import in_any_form
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.fitting.other_forms import in_any_form
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.forces.replicate import replicate
+from rtcomp.diagnosis.forces.sticking import courses, untold
 from rtcomp.diagnosis.pipeline import diagnose
-from rtcomp.diagnosis.replicate import replicate
-from rtcomp.diagnosis.sticking import MUCH, courses, hides, untold
-from rtcomp.diagnosis.trajectory import Trajectory
-from rtcomp.diagnosis.windows import GROUPS, Windows
+from rtcomp.diagnosis.positions.belief import Belief
+from rtcomp.diagnosis.positions.hidden import MUCH, hides
+from rtcomp.diagnosis.positions.trajectory import Trajectory
+from rtcomp.diagnosis.positions.windows import GROUPS, Windows
+from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.errors import ConfigError
 from rtcomp.jobs.demo import shipped
 from rtcomp.recording.driven import driven

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from recorded import run, stage, there_and_back
 
-from rtcomp.diagnosis.balance import ForceBalance
-from rtcomp.diagnosis.baseline import baseline
-from rtcomp.diagnosis.data import load_data
-from rtcomp.diagnosis.fit import Fitter
-from rtcomp.diagnosis.free import Term
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.fitting.unbiased import numbers_of, unbiased
+from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.pipeline import diagnose
-from rtcomp.diagnosis.unbiased import numbers_of, unbiased
+from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
 from rtcomp.trial.draw import Case, Plan, draw

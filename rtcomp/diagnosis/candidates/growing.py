@@ -1,0 +1,73 @@
+"""Growing: a model with each of its best candidates, fitted in full."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rtcomp.diagnosis import clock
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.candidates.effects import Candidate, started
+from rtcomp.diagnosis.candidates.scanning import scanned
+from rtcomp.diagnosis.candidates.screening import Screened
+from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.fitted import Fitted
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.settings import FULL_FITS
+from rtcomp.errors import ConfigError
+
+
+def grow(
+    fitter: Fitter, model: Fitted, made: Sequence[Candidate], screened: Sequence[Screened], ends: float
+) -> list[Fitted]:
+    """Return the model with each of the best candidates, fitted in full."""
+    families: dict[str, list[Term]] = {}
+    for i in np.argsort([-s.gain for s in screened], kind="stable").tolist():
+        families.setdefault(made[i].family, []).append(started(made[i], screened[i].sizes))
+    terms = fitter.rough(model, list(families.values()), FULL_FITS, ends)
+    # First order is no guide to what is behind a play: its own motion is followed from place to place.
+    behind = {c.name: c.term for c in made if fitter.by_force and ent.kind_of(c.term.entry).behind}
+    terms = [t for t in terms if t.entry["name"] not in behind]
+    terms += [one for term in behind.values() for one in scanned(fitter, model, term, ends)]
+    found = fitted_in_time(fitter, model, terms, ends)
+    return [*found, *fitted_in_time(fitter, model, in_better_form(fitter, found, ends), ends)]
+
+
+def in_better_form(fitter: Fitter, found: Sequence[Fitted], ends: float) -> list[Term]:
+    """Return the last terms in another form, where that leaves less at the same values."""
+
+    def better_than(larger: Fitted, term: Term) -> bool:
+        if clock.now() > ends:
+            return False
+        try:
+            return fitter.quick([*larger.terms[:-1], term]) < larger.sse
+        except (ConfigError, np.linalg.LinAlgError):
+            return False
+
+    better = []
+    for larger in found:
+        term = larger.terms[-1]
+        kind = ent.kind_of(term.entry)
+        for p in kind.parameters:
+            if p.name not in term.entry or not ent.is_form(kind, p):
+                continue
+            others = [v for v in (kind.search_grid.get(p.name) or (p.low, p.high)) if v != term.entry[p.name]]
+            made = [term.with_entry({**term.entry, p.name: value}) for value in others]
+            better += [one for one in made if better_than(larger, one)]
+    return better
+
+
+def fitted_in_time(fitter: Fitter, model: Fitted, terms: Sequence[Term], ends: float) -> list[Fitted]:
+    """Return the model with each term, fitted, where that is possible; none is begun after `ends` (s)."""
+
+    def fit(term: Term) -> Fitted | None:
+        if clock.now() > ends:
+            return None
+        try:
+            return fitter.fit([*model.terms, term], model)
+        except (ConfigError, np.linalg.LinAlgError):
+            return None
+
+    return [f for f in shared(fit, terms) if f is not None]

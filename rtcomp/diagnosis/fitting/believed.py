@@ -1,0 +1,59 @@
+"""What is believed of the columns of a force balance: a prior and bounds for each coefficient."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.forces.balance import BASE, ForceBalance
+from rtcomp.diagnosis.numerics.regression import Prior, System
+from rtcomp.diagnosis.settings import BELIEF_SD
+
+FURTHEST = 5.0
+"""Prior standard deviations from its believed size within which an effect may always be."""
+
+
+def prior_of(balance: ForceBalance, terms: Sequence[Term], system: System, *, offset: bool) -> Prior:
+    """Return what is believed: mass, damping and sizes near the belief, no negative stiffness.
+
+    `terms` are those of the believed entries whose sizes are refitted, then those of the model; with `offset`
+    there may be a constant force that nobody believes.
+    """
+    m, believed = balance.stage.mechanics, terms[: len(balance.believed)]
+    size = system.columns.shape[0]
+    mean, precision = np.zeros(size), np.zeros(size)
+    low, high = np.full(size, -np.inf), np.full(size, np.inf)
+    low[: balance.size] = 0.0
+    for i, value in enumerate((m.mass, m.viscous, m.micro_damping)):
+        if value > 0.0:
+            mean[i], precision[i] = value, (BELIEF_SD * value) ** -2
+        elif balance.without(BASE[i]):
+            high[i] = 0.0
+    low[0] = 1e-3 * m.mass
+    if balance.believed_speed is None:
+        low[balance.faster], high[balance.faster] = -balance.speed_room, balance.speed_room
+    else:
+        off = math.log(balance.believed_speed / m.micro_damping_speed)
+        mean[balance.faster], low[balance.faster] = m.micro_damping * off, -np.inf
+        precision[balance.faster] = (BELIEF_SD * m.micro_damping) ** -2
+    if offset and not any(ent.kind_of(t.entry).bias for t in terms):
+        low[balance.size - 1] = -np.inf
+    else:
+        high[balance.size - 1] = 0.0
+    for term, span in zip(terms, system.of_entry, strict=True):
+        if span.stop > span.start:
+            low[span], high[span] = ent.bounds_of(term.entry)
+    for term, span in zip(believed, system.of_entry, strict=False):
+        sizes = ent.sizes_of(term.entry)
+        # What is believed is possible, on whichever side of nothing a search would look for it.
+        wide = FURTHEST * BELIEF_SD * np.abs(sizes)
+        low[span], high[span] = np.minimum(low[span], sizes - wide), np.maximum(high[span], sizes + wide)
+        near = sizes != 0.0
+        where = np.arange(span.start, span.stop)
+        mean[where[near]] = sizes[near]
+        precision[where[near]] = (BELIEF_SD * np.abs(sizes[near])) ** -2
+    return Prior(mean, precision, low, high)

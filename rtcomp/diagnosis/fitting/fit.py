@@ -1,0 +1,350 @@
+"""Fit of a model: linear coefficients and nonlinear parameters together, and its error on blocks left out.
+
+Variable projection (Golub and Pereyra 1973): a step moves the nonlinear parameters by Gauss and Newton with
+the linear coefficients free, then these are solved again within their bounds. Blocks are left out on the
+problem linearised there, with all parameters refitted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.cache import KEPT_ONCE, Cache
+from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.fitting import starting
+from rtcomp.diagnosis.fitting.at_hand import (
+    by_weights,
+    consistent,
+    goes_by_whole,
+    newly_behind,
+    system_around,
+    tangents_of,
+)
+from rtcomp.diagnosis.fitting.believed import prior_of
+from rtcomp.diagnosis.fitting.fitted import Fitted, left_out
+from rtcomp.diagnosis.fitting.free import Free, Term, changed, free_of
+from rtcomp.diagnosis.fitting.other_forms import other_beliefs, other_forms, variants
+from rtcomp.diagnosis.fitting.retuned import level_and_reach
+from rtcomp.diagnosis.fitting.stage_of import stage_of
+from rtcomp.diagnosis.forces.balance import BASE, ForceBalance
+from rtcomp.diagnosis.forces.noise import Noise
+from rtcomp.diagnosis.mismatch.where import as_force, as_seen
+from rtcomp.diagnosis.numerics.regression import Grams, Prior, System
+from rtcomp.diagnosis.recordings.data import Data
+from rtcomp.diagnosis.result import PositionFit
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats
+from rtcomp.physics import Effect
+from rtcomp.stage.stage import Stage
+
+STEPS = 10
+"""Gauss-Newton steps at most."""
+SETTLED = 1e-4
+"""Relative gain of a step below which the fit ends."""
+TURNS = 6
+"""Turns at most in which friction is refitted that what goes by it was made for."""
+
+
+class Fitter:
+    """One objective, here the force balance: what a model leaves of it, and fits of models to it."""
+
+    by_force = True
+    """Whether forces are balanced: friction is a grid of units, and what effects change adds up."""
+
+    def __init__(self, balance: ForceBalance) -> None:
+        self.balance = balance
+        self.offset = False
+        """Whether a constant force that nobody believes is fitted beside every model."""
+        self._believed = [Term.of(e) for e in balance.believed]
+        self._forms = Cache(KEPT_ONCE)
+
+    @property
+    def use(self) -> np.ndarray:
+        """Blocks to fit, (blocks,) bool: those that are not reserved."""
+        return ~self.balance.reserved
+
+    @property
+    def block(self) -> np.ndarray:
+        """Block of each row of the residual, (n,), sorted."""
+        return self.balance.block
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return self.balance.blocks
+
+    @property
+    def rows(self) -> np.ndarray:
+        """Rows of the residual that are not reserved, (n,) bool."""
+        return np.asarray(self.use[self.block])
+
+    @property
+    def power(self) -> float:
+        """Squared residual of blocks that are not reserved if nothing at all were explained."""
+        return self.balance.power
+
+    def linear(self, kind: type[Effect]) -> bool:
+        """Tell whether the sizes of an effect are coefficients, so that any start value of them will do."""
+        return ent.adds_force(kind)
+
+    def rough(self, model: Fitted, families: Sequence[Sequence[Term]], count: int, ends: float) -> list[Term]:
+        """Return terms of `count` families worth a full fit; the likeliest come first there and in each."""
+        return starting.as_they_are(lambda term: self.quick([*model.terms, term]), families[:count], ends)
+
+    def units(self, entries: Sequence[Entry]) -> Floats:
+        """Return the columns (q, n) of unit sizes of the last of `entries`, which is `linear`."""
+        return self.balance.forces_of(entries)
+
+    def change(self, model: Fitted, entry: Entry) -> Floats:
+        """Return by how much more a model accounts for with an entry at work, (n,), coefficients held."""
+        b = self.balance
+        return model.residual - b.error([*model.entries, entry], model.coefficients, model.weights)
+
+    def stage(self, model: Fitted, *, between: bool = False) -> Stage:
+        """Return a model as a stage; `between`: with friction that its own grid does not quite reach."""
+        return stage_of(self.balance, model, between=between)
+
+    def force(self, model: Fitted) -> Floats:
+        """Return the force (N) that a model leaves open on the compared rows of the balance."""
+        return as_force(self.balance, model.residual)
+
+    def without(self, model: Fitted, at: int) -> Floats:
+        """Return the force (N) that a model leaves open without its effect number `at`, others as are."""
+        b = self.balance
+        others = [*model.entries[:at], *model.entries[at + 1 :]]
+        span = model.system.of_entry[len(b.believed) + at]
+        c = np.delete(model.coefficients, np.arange(span.start, span.stop))
+        return as_force(b, b.error(others, c, model.weights))
+
+    def other_forms(self, model: Fitted, besides: str) -> Floats:
+        """Return the columns (q, n) of what other forms of its effects do, but of that which is `besides`."""
+        own = [self.forms_of(model, i) for i in range(len(model.terms))]
+        return np.concatenate([other_beliefs(self.balance, model, besides), *own])
+
+    def other_friction(self, model: Fitted) -> Floats:
+        """Return the columns (q, n) of friction of another shape than believed: none, the grid's is free."""
+        return np.zeros((0, model.residual.size))
+
+    def forms_of(self, model: Fitted, at: int) -> Floats:
+        """Return the columns (q, n) of what other forms of its effect number `at` do."""
+        made = self._forms.of(model, lambda: [other_forms(self, model, i) for i in range(len(model.terms))])
+        return np.asarray(made[at])
+
+    def variants(self, model: Fitted, at: int) -> Floats:
+        """Return the columns (q, n) that another form of its effect number `at` would add by its own law."""
+        return variants(self, model, at)
+
+    def relative(self, model: Fitted, *, seen: bool = False) -> float:
+        """Return what a model leaves over what there is, rms, not reserved; `seen`: above the noise.
+
+        Rows count as far as motion tells what friction does there.
+        """
+        b, both = self.balance, (self.force(model), self.balance.drive_force())
+        left, given = ((b.trust * (as_seen(b, f) if seen else f))[self.rows] for f in both)
+        return math.sqrt(np.mean(left**2) / max(np.mean(given**2), 1e-300))
+
+    def left_by(self, stage: Stage) -> Floats:
+        """Return what any stage leaves as it is in each row, (n,), over what there is to explain (rms)."""
+        drive, needed = self.balance.both_sides(stage)
+        return np.asarray(drive - needed) / math.sqrt(max(np.mean(drive[self.rows] ** 2), 1e-300))
+
+    def has_offset(self, model: Fitted) -> bool:
+        """Tell whether a model has a constant force beside its entries."""
+        return bool(model.coefficients[self.balance.size - 1] != 0.0)
+
+    def louder(self, model: Fitted) -> float:
+        """Return how many times louder noise may be by what a model leaves, where none is stated."""
+        b = self.balance
+        if Noise.stated(b.stage) > 0.0:
+            return 1.0
+        sizes = [s.time[b.whitening.rows(s)].size for s in b.data.segments]
+        return b.whitening.louder(np.split(model.residual, np.cumsum(sizes)[:-1]), b.noise, b.data)
+
+    def above_noise(self, model: Fitted, louder: float = 1.0, noise: float = math.inf) -> float:
+        """Return that relative error (rms) above that of noise, so many times `louder`.
+
+        `noise` is the squared error of replicates: counts of a slow axis are not white, and may be less.
+        """
+        weight = self.balance.trust**2
+        power = float(np.sum(weight * self.balance.drive_force() ** 2) / np.sum(weight))
+        white, left = self.balance.noise_power / max(power, 1e-300), self.relative(model) ** 2
+        if Noise.stated(self.balance.stage) > 0.0:  # else replicates are read by a sensor that is guessed
+            white = min(white, left * noise / max(float(model.errors.sum()), 1e-300))
+        return float(np.sqrt(max(left - louder**2 * white, 0.0)))
+
+    def numbers(self, model: Fitted, *, effects: bool) -> tuple[Floats, Floats, Floats]:
+        """Return mass, damping, level and reach of friction, and sizes of believed `effects` by amount.
+
+        Those of the model, (q,), without each block, (B_use, q), and the believed sizes with their signs.
+        """
+        b = self.balance
+        sizes = np.concatenate([np.zeros(0), *(ent.sizes_of(e) for e in b.believed if effects)])
+        own = slice(b.size, b.size + sizes.size)
+        sign = np.where(sizes < 0.0, -1.0, 1.0)
+
+        def of(c: Floats) -> Floats:
+            elements = list(zip(c[b.friction], b.reaches, strict=True))
+            return np.array([*c[: len(BASE)], *level_and_reach(elements), *(sign * c[own])])
+
+        return of(model.coefficients), np.array([of(c) for c in model.without]), sizes
+
+    def believed_as(self, model: Fitted, c: Floats) -> list[Entry]:
+        """Return the believed entries whose sizes are refitted, with those of coefficients `c` of a model."""
+        return [
+            ent.composed(e, c[span])
+            for e, span in zip(self.balance.believed, model.system.of_entry, strict=False)
+        ]
+
+    def position(self, before: Stage, retuned: Stage, after: Stage, seed: int) -> PositionFit | None:
+        """Return errors of position on the reserved part; None where forces judge."""
+        return None
+
+    def on(self, data: Data) -> Fitter:
+        """Return the same objective on other data of equal length: a replicate."""
+        other = Fitter(self.balance.on(data))
+        other.offset = self.offset
+        return other
+
+    def solve(
+        self, terms: Sequence[Term], weights: Floats, variance: float, around: Floats | None = None
+    ) -> tuple[System, Prior, Grams, Floats, float]:
+        """Return the system of `terms`, its prior, statistics, coefficients and squared error in sample."""
+        system, prior, grams = self._made(terms, weights, around)
+        c = grams.solve(self.use, prior, variance)
+        return system, prior, grams, c, float(grams.errors(c, self.use).sum())
+
+    def _made(
+        self, terms: Sequence[Term], weights: Floats, around: Floats | None
+    ) -> tuple[System, Prior, Grams]:
+        b = self.balance
+        system = system_around(b, [t.entry for t in terms], weights, around)
+        prior = prior_of(b, [*self._believed, *terms], system, offset=self.offset)
+        return system, prior, Grams.of(system.columns, system.y, b.block, b.blocks)
+
+    def quick(self, terms: Sequence[Term]) -> float:
+        """Return the squared error in sample of `terms` as they are, with believed friction at work."""
+        weights = self.balance.weights
+        for _ in range(2 if by_weights(self.balance, [t.entry for t in terms]) else 1):
+            _, _, _, c, sse = self.solve(terms, weights, 1.0)
+            weights = c[self.balance.friction]
+        return sse
+
+    def fit(self, terms: Sequence[Term], start: Fitted | None = None, steps: int = STEPS) -> Fitted:
+        """Fit a model from the values that its terms have; raise ConfigError where these are impossible."""
+        b = self.balance
+        current, weights = list(terms), b.weights
+        alike = start is not None and start.weights.size == b.reaches.size
+        if start is not None and alike and not newly_behind(terms, start.terms):
+            weights = start.weights
+        count = max(int(self.rows.sum()), 1)
+        variance = 1.0 if start is None else start.variance
+        entries, made_for = [t.entry for t in current], weights
+        system, prior, grams, c, sse = self.solve(current, made_for, variance)
+        variance = sse / count
+        if by_weights(b, entries):
+            made_for, current = c[b.friction], self._sized(current, system, c)
+            system, prior, grams = self._made(current, made_for, c)
+        c = grams.solve(self.use, prior, variance)
+        sse = float(grams.errors(c, self.use).sum())
+        variance = sse / count
+        weights = c[b.friction]
+        free = free_of(current, b)
+        damping, tangents = 1e-3, None
+        for _ in range(steps if free else 0):
+            tangents = tangents_of(b, current, free, system, c, weights)
+            joint, wide = self.jointly(system, prior, tangents)
+            power = np.diag(joint.gram[self.use].sum(axis=0))[c.size :]
+            improved = False
+            for _ in range(4):
+                held = np.concatenate([wide.precision[: c.size], damping * power / max(variance, 1e-300)])
+                whole = joint.solve(self.use, Prior(wide.mean, held, wide.low, wide.high), variance)
+                if joint.errors(whole, self.use).sum() > (1.0 - SETTLED) * sse:
+                    break  # no step is expected to gain anything
+                trial = changed(self._sized(current, system, c), free, whole[c.size :])
+                try:
+                    found = self.solve(trial, weights, variance, c)
+                except ConfigError:
+                    damping *= 10.0
+                    continue
+                if found[-1] < sse:
+                    improved = True
+                    break
+                damping *= 10.0
+            if not improved:
+                break
+            gained, tangents = 1.0 - found[-1] / sse, None
+            current, made_for = trial, weights
+            system, prior, _grams, c, sse = found
+            weights, variance = c[b.friction], sse / count
+            damping = max(0.1 * damping, 1e-6)
+            free = free_of(current, b)
+            if gained < SETTLED:
+                break
+        turns = TURNS if goes_by_whole(b, entries) else 0
+        with suppress(ConfigError):  # where it grows beyond all bounds, it stays as it was
+            while turns > 0 and not consistent(b, made_for, weights):
+                system, prior, _, c, sse = self.solve(current, weights, variance, c)
+                made_for, weights, turns, tangents = weights, c[b.friction], turns - 1, None
+        if tangents is None:
+            tangents = tangents_of(b, current, free, system, c, weights)
+        done = self._finished(current, free, system, prior, c, tangents, sse, variance, weights)
+        return self._as_it_is(done) if goes_by_whole(b, entries) else done
+
+    def moved_by(self, model: Fitted, change: Floats) -> Fitted:
+        """Return a model with coefficients and nonlinear parameters, (p + q,), others by `change`.
+
+        Friction keeps its shape: its level changes. Raises ConfigError where no stage has such numbers.
+        """
+        c, own, reaches = model.coefficients, self.balance.friction, self.balance.reaches
+        moved = np.clip(c + change[: c.size], model.prior.low, model.prior.high)
+        level, more = (float(each[own] @ reaches) for each in (c, change))
+        moved[own] = c[own] * (max(1.0 + more / level, 0.0) if level > 0.0 else 1.0)
+        terms = self._sized(changed(model.terms, model.free, change[c.size :]), model.system, moved)
+        rest = self.balance.error([t.entry for t in terms], moved, moved[own])
+        return replace(model, terms=tuple(terms), coefficients=moved, residual=rest, weights=moved[own])
+
+    def _as_it_is(self, model: Fitted) -> Fitted:
+        """Return a model with the error of its own friction: its columns were made for one much like it."""
+        true = self.balance.error(model.entries, model.coefficients, model.weights)
+        worse = max(float(np.sum(true[self.rows] ** 2)) / max(model.sse, 1e-300), 1.0)
+        return replace(model, residual=true, sse=worse * model.sse, errors=worse * model.errors)
+
+    def jointly(self, system: System, prior: Prior, more: Floats) -> tuple[Grams, Prior]:
+        """Return statistics and prior of the columns of a system and of `more`, (q, n), together."""
+        columns = np.concatenate([system.columns, more])
+        return Grams.of(columns, system.y, self.block, self.blocks), prior.extended(more.shape[0])
+
+    def _finished(
+        self,
+        terms: list[Term],
+        free: list[Free],
+        system: System,
+        prior: Prior,
+        c: Floats,
+        tangents: Floats,
+        sse: float,
+        variance: float,
+        weights: Floats,
+    ) -> Fitted:
+        joint, wide = self.jointly(system, prior, tangents)
+        whole = np.concatenate([c, np.zeros(len(free))])
+        errors, without = left_out(joint, self.use, wide, variance, whole)
+        residual = system.y - c @ system.columns
+        return Fitted(
+            tuple(self._sized(terms, system, c)), c, system, prior, residual, tangents, tuple(free), errors,
+            without, sse, variance, weights,
+        )  # fmt: skip
+
+    def _sized(self, terms: Sequence[Term], system: System, c: Floats) -> list[Term]:
+        """Return terms with the sizes that coefficients `c` of their system give them."""
+        spans = system.of_entry[len(self._believed) :]
+        return [
+            term.with_entry(ent.composed(term.entry, c[span])) if span.stop > span.start else term
+            for term, span in zip(terms, spans, strict=True)
+        ]

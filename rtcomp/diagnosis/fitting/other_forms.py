@@ -1,0 +1,215 @@
+"""What other forms of a model's effects would do: their forces, bent along what they may depend on.
+
+The kernels of the catalogue are not the only forms that an effect may have. Where its form is another, its
+force times a smooth function of position, speed, time or of itself makes up for most of it, and for a wave
+the same over a period. A force that is a smooth function of position may be any other one. What only does the
+same is no further effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.fitting.fitted import Fitted, left_out
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.mismatch.where import ROUNDING, as_white
+from rtcomp.diagnosis.numerics.regression import Grams, Prior
+from rtcomp.kernels import Floats
+from rtcomp.physics import Effect
+
+if TYPE_CHECKING:
+    from rtcomp.diagnosis.fitting.fit import Fitter
+
+OTHERS = {1.0: (1 / 2, 1 / 3), 2.0: (2.0, 2 / 3)}
+"""Periods of a wave's other harmonics, over the one that was found, by the period after which it repeats: the
+one found is the first or the second of them."""
+KNOTS = 6
+"""Knots over the stroke of splines that tell a smooth function of position: a wave that is there three times
+is none."""
+SMOOTH = 0.05
+"""Part (rms) of a force that they may leave of it."""
+LONGER = 0.02
+"""Step of the derivative by the period, in waves over the stroke: a period that was fitted without overtones
+is biased."""
+
+
+def other_forms(fitter: Fitter, model: Fitted, at: int) -> Floats:
+    """Return the columns (q, n) of what other forms of a model's effect number `at` do."""
+    entry = model.entries[at]
+    bent = _bent(fitter.balance, entry, force_of(fitter, model, at))
+    return np.concatenate([bent, overtones(fitter, model, entry)])
+
+
+def variants(fitter: Fitter, model: Fitted, at: int) -> Floats:
+    """Return the columns (q, n) that another form of a model's effect number `at` would add by its own law.
+
+    Of a wave its overtones, of what goes by the time of the run another course.
+    """
+    return np.concatenate([overtones(fitter, model, model.entries[at]), _courses(fitter, model, at)])
+
+
+def force_of(fitter: Fitter, model: Fitted, at: int) -> Floats:
+    """Return the force (N, (n,)) of a model's effect number `at`."""
+    return fitter.without(model, at) - fitter.force(model)
+
+
+def _bent(balance: ForceBalance, entry: Entry, force: Floats) -> Floats:
+    """Return the whitened columns (q, n) of an entry's `force` (N, (n,)), bent by functions of size 1.
+
+    None of a constant: bent, it is no constant.
+    """
+    most = float(np.abs(force).max(initial=0.0))
+    if not np.isfinite(most) or _size(force) == 0.0:
+        return np.zeros((0, force.size))
+    others = of_position(balance, entry)
+    if others.size:
+        return others
+    return np.array([as_white(balance, force * bend) for bend in _bends(balance, force / most)])
+
+
+def of_position(balance: ForceBalance, entry: Entry) -> Floats:
+    """Return the whitened columns (q, n) of any other function of position, where an entry's force is one.
+
+    As large as what varies of the force; none where that is no smooth function of position.
+    """
+    none = np.zeros((0, balance.block.size))
+    if not ent.adds_force(ent.kind_of(entry)):
+        return none
+    effect, pairs = ent.build(entry), zip(balance.data.segments, balance.paths(), strict=True)
+    force = balance.plain([balance.force_of(effect, segment, path) for segment, path in pairs])
+    position = balance.plain([p.x for p in balance.paths()])
+    size, splines = _size(force), _natural_splines(position)
+    rest = force - (force @ splines.T) @ splines / position.size
+    if not _size(rest) < SMOOTH * size:
+        return none
+    return np.array([as_white(balance, size * each) for each in splines[1:]])
+
+
+def _size(force: Floats) -> float:
+    """Return the size (rms) of what varies of a force, 0 where that is rounding."""
+    varies = float(np.std(force))
+    return varies if varies > ROUNDING * float(np.abs(force).max(initial=0.0)) else 0.0
+
+
+def _natural_splines(position: Floats) -> Floats:
+    """Return functions (KNOTS, n) that span natural cubic splines of a position (n,), of unit rms.
+
+    Orthogonal, the first a constant (Hastie, Tibshirani, Friedman 2009, The Elements of Statistical Learning,
+    section 5.2.1).
+    """
+    low, high = float(position.min()), float(position.max())
+    at, knots = (position - low) / max(high - low, 1e-300), np.linspace(0.0, 1.0, KNOTS)
+    cubes = np.maximum(at - knots[:, None], 0.0) ** 3
+    bent = (cubes[:-1] - cubes[-1]) / (1.0 - knots[:-1, None])
+    span = np.array([np.ones_like(at), at, *(bent[:-1] - bent[-1])])
+    return np.asarray(np.sqrt(position.size) * np.linalg.qr(span.T)[0].T)
+
+
+def other_beliefs(balance: ForceBalance, model: Fitted, besides: str) -> Floats:
+    """Return the columns (q, n) of other functions of position than those believed, but of effect `besides`.
+
+    That one is the other form: a spring that hardens beside a belief of a linear one is told by its name.
+    """
+    found = [np.zeros((0, model.residual.size))]
+    for entry, span in zip(balance.believed, model.system.of_entry, strict=False):
+        if entry["name"] != besides and span.stop > span.start:
+            found.append(of_position(balance, ent.composed(entry, model.coefficients[span])))
+    return np.concatenate(found)
+
+
+def _courses(fitter: Fitter, model: Fitted, at: int) -> Floats:
+    """Return the columns (q, n) of another course in time of a model's effect number `at`.
+
+    None of what does not go by the time of the run.
+    """
+    balance = fitter.balance
+    if not ent.goes_by_time(ent.kind_of(model.entries[at])):
+        return np.zeros((0, model.residual.size))
+    force, time = force_of(fitter, model, at), balance.plain([s.time for s in balance.data.segments])
+    return np.array([as_white(balance, force * bend) for bend in _bent_by(time)])
+
+
+def overtones(fitter: Fitter, model: Fitted, entry: Entry) -> Floats:
+    """Return the columns (q, n) of what makes a wave of one form one of another.
+
+    None of what is no wave, or does not repeat within the stroke: that is any function of the position.
+    """
+    kind = ent.kind_of(entry)
+    phase = next((p.name for p in kind.parameters if p.unit == ent.PHASE), None)
+    low, high = fitter.balance.data.stroke
+    wave = phase is not None and {ent.PERIOD, ent.AMPLITUDE} <= entry.keys()
+    if phase is None or not wave or 2.0 * float(entry[ent.PERIOD]) > high - low:
+        return np.zeros((0, model.residual.size))
+    still = {n: ent.neutral(kind, n) for n in kind.linear if n in entry and n != ent.AMPLITUDE}
+    found = []
+    repeated = [repeats for repeats in OTHERS if 2.0 * repeats * float(entry[ent.PERIOD]) <= high - low]
+    for over in (one for repeats in repeated for one in OTHERS[repeats]):
+        period, made = float(entry[ent.PERIOD]) * over, []
+        for longer in (0.0, LONGER * period / (high - low)):
+            other = {**entry, **still, ent.PERIOD: period * (1.0 + longer)}
+            other.pop("form", None)
+            made.append(_quarters(fitter, model, kind, other, phase))
+        found += [made[0], (made[1] - made[0]) / LONGER]
+    return np.concatenate(found)
+
+
+def _quarters(fitter: Fitter, model: Fitted, kind: type[Effect], wave: Entry, phase: str) -> Floats:
+    """Return what a wave does beside a model, and what it does a quarter of a period later, (2, n)."""
+    if fitter.linear(kind):
+        return float(wave[ent.AMPLITUDE]) * fitter.units([*model.entries, wave])
+    return np.array([fitter.change(model, {**wave, phase: at}) for at in (0.0, 0.5 * np.pi)])
+
+
+def errors_beside(fitter: Fitter, model: Fitted, forms: Floats) -> Floats:
+    """Return the squared errors (B_use,) of blocks left out, with other forms (q, n) beside a model.
+
+    Or without them, where these predict no better: a form that is fitted to noise explains nothing.
+    """
+    if not forms.size:
+        return model.errors
+    _, joint, prior, whole = _beside(fitter, model, forms)
+    found = left_out(joint, fitter.use, prior, model.variance, whole)[0]
+    return min(model.errors, found, key=lambda errors: float(np.log(errors).sum()))
+
+
+def in_any_form(fitter: Fitter, model: Fitted, forms: Floats) -> Fitted:
+    """Return what a model would leave with other forms (q, n) beside it."""
+    if not forms.size:
+        return model
+    columns, _, _, whole = _beside(fitter, model, forms)
+    return replace(model, residual=model.system.y - whole @ columns)
+
+
+def _beside(fitter: Fitter, model: Fitted, forms: Floats) -> tuple[Floats, Grams, Prior, Floats]:
+    """Return all columns with other forms beside a model, their statistics, prior and coefficients.
+
+    A form is believed to differ by about the effect's own size.
+    """
+    more = np.concatenate([model.tangents, forms])
+    joint, prior = fitter.jointly(model.system, model.prior, more)
+    prior.precision[-forms.shape[0] :] = 1.0
+    columns = np.concatenate([model.system.columns, more])
+    return columns, joint, prior, joint.solve(fitter.use, prior, model.variance)
+
+
+def _bends(balance: ForceBalance, force: Floats) -> Iterator[Floats]:
+    """Go through smooth functions (n,) between -1 and 1 of what a force may depend on."""
+    paths = balance.paths()
+    position = balance.plain([p.x for p in paths])
+    time = balance.plain([s.time for s in balance.data.segments])
+    for signal in (position, balance.plain([p.v for p in paths]), time, force):
+        yield from _bent_by(signal)
+
+
+def _bent_by(signal: Floats) -> Iterator[Floats]:
+    """Go through the first two Legendre polynomials of a signal (n,) over its range."""
+    low, high = float(signal.min()), float(signal.max())
+    at = (2.0 * signal - low - high) / max(high - low, 1e-300)
+    yield at
+    yield 1.5 * at**2 - 0.5

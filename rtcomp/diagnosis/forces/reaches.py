@@ -1,0 +1,43 @@
+"""Yield displacements of the friction units: a coarse grid, the believed ones, and both joined."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rtcomp.diagnosis.recordings.data import Data
+from rtcomp.kernels import Floats
+from rtcomp.physics.maxwell_slip import MaxwellSlip
+from rtcomp.stage.stage import Stage
+
+GRID = 22
+"""Yield displacements of the coarse friction grid, from the sensor's grain on."""
+LONGEST, YIELDS = 0.125, 0.5
+"""Parts of the stroke: the longest yield displacement looked for, and that beyond which nothing yields."""
+BEYOND = 1.3
+"""Times the longest believed one that friction may reach."""
+MOST_OWN = 10
+"""Believed yield displacements up to which they are taken into the grid as they are."""
+
+
+def grid(stage: Stage, data: Data, grain: float) -> Floats:
+    """Return yield displacements (m) from the grain to an eighth of the stroke, the believed ones in it.
+
+    A motion that hardly leaves the presliding that is believed has longer ones, up to what it could yield.
+    """
+    low, high = data.stroke
+    longest = LONGEST * (high - low)
+    shortest = max(2.0 * grain, 1e-5 * longest)
+    friction = stage.friction
+    if isinstance(friction, MaxwellSlip):
+        own = [r for _, r in friction.elements]
+        shortest = min(shortest, *own)
+        longest = max(longest, min(BEYOND * max(own), YIELDS * (high - low)))
+    return np.geomspace(min(shortest, 0.5 * longest), longest, GRID)
+
+
+def joined(own: Floats, grid: Floats, step: float) -> Floats:
+    """Return believed yield displacements (m) and those of a grid that are not close to one of them."""
+    if not own.size:
+        return np.sort(grid)
+    apart = np.min(np.abs(np.log(grid[:, None] / own[None, :])), axis=1)
+    return np.sort(np.concatenate([own, grid[apart > 0.3 * step]]))

@@ -1,0 +1,339 @@
+"""Signals along the recordings: drive side, and what the motion needs of mass, friction and each effect.
+
+Unfiltered, one array a segment. Entries that add a force are columns of free size; those that change
+friction, drive, sensor or mass are at work while the other columns are made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.cache import Cache, Group, key_of
+from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.forces.bank import AS_IT_IS, SPEED_UNITS, deflections, units_along
+from rtcomp.diagnosis.forces.kinematics import Path, second_difference
+from rtcomp.diagnosis.forces.noise import Noise
+from rtcomp.diagnosis.forces.play import Carried, Load, behind_play
+from rtcomp.diagnosis.forces.reaches import grid
+from rtcomp.diagnosis.numerics.spectrum import filtered
+from rtcomp.diagnosis.recordings.data import Data, Segment, behind_reading
+from rtcomp.kernels import Floats
+from rtcomp.physics import Effect, Place, catalogue
+from rtcomp.physics.maxwell_slip import MaxwellSlip
+from rtcomp.stage.balance import around_rows, forces, parts_of_drive
+from rtcomp.stage.stage import Stage
+
+BASE = ("mass", "viscous", "micro_damping")
+"""Numbers whose columns come first. After them that of the speed of micro-damping, to first order, then
+those of the friction units, and a constant force."""
+FURTHEST = 0.3
+"""Largest change of its logarithm that is taken from one fit."""
+PARTS = 2
+"""Parts of a row for friction: where it turns within one, the force at its ends is not that between."""
+GRAINS = 1.5
+"""Motion there and back that is noise, in times the noise (rms) that smoothing leaves."""
+MORE = 1e-3
+"""Relative change of the command to which that of friction is looked at."""
+
+
+class Signals:
+    """What one stage makes of one set of recordings, row by row."""
+
+    def __init__(self, stage: Stage, data: Data, noise: Noise | None = None) -> None:
+        self.stage, self.data = stage, data
+        self.noise = noise or Noise.of(stage, data)
+        share = min(1.0, self.noise.bandwidth / (0.5 * data.rate))
+        self.grain = GRAINS * self.noise.rms * float(np.sqrt(share))
+        self.coarse = grid(stage, data, self.grain)
+        """Yield displacements (m) over all that the recording could show."""
+        self.reaches = self.coarse
+        self.step = float(np.log(self.reaches[1] / self.reaches[0]))
+        """Between yield displacements (logarithm)."""
+        believed = [dict(e) for e in stage.mechanics.effects]
+        self.believed = [e for e in believed if _refitted(e)]
+        """Entries of the belief that add a force: their sizes are refitted with the base."""
+        self._fixed = [ent.build(e) for e in believed if not _refitted(e)]
+        friction = stage.friction
+        self._elements = list(friction.elements) if isinstance(friction, MaxwellSlip) else []
+        self._cache = Cache()
+        m = stage.mechanics
+        self.believed_speed = m.micro_damping_speed if m.micro_damping > 0.0 else None
+        """Speed (m/s) below which micro-damping is believed to act, None where there is no such belief."""
+        self.speed_room = 0.0
+        """N s/m, up to which the column of that speed goes where none is believed: first order ends there."""
+
+    @property
+    def believed_reaches(self) -> Floats:
+        """Yield displacements (m) that the belief states."""
+        return np.unique([r for _, r in self._elements])
+
+    @property
+    def size(self) -> int:
+        """Columns of the base: mass, damping and its speed, friction units, and last a constant force."""
+        return len(BASE) + 1 + self.reaches.size + 1
+
+    @property
+    def friction(self) -> slice:
+        """Columns of the friction units, in the order of `reaches`."""
+        return slice(len(BASE) + 1, len(BASE) + 1 + self.reaches.size)
+
+    @property
+    def faster(self) -> int:
+        """Column of the speed of micro-damping: its coefficient is damping times the change of log speed."""
+        return len(BASE)
+
+    def speed_of(self, c: Floats) -> float:
+        """Return the speed (m/s) of micro-damping that coefficients `c` of the base tell."""
+        now, damping = self.stage.mechanics.micro_damping_speed, float(c[self.faster - 1])
+        if damping <= 0.0:
+            return now
+        change = float(np.clip(c[self.faster] / damping, -FURTHEST, FURTHEST))
+        return now * float(np.exp(change))
+
+    def without(self, number: str) -> bool:
+        """Tell whether the belief denies a number of the base: it has friction, but none of this kind.
+
+        Then an effect that stands for it may be missing; a belief without friction leaves it open.
+        """
+        stated = float(getattr(self.stage.mechanics, number))
+        named = any(k.stands_for == number and k.searchable for k in catalogue.entries())
+        return stated == 0.0 and self.stage.friction is not None and named
+
+    def smooth_for(self, part: float) -> None:
+        """Smooth the position as if only `part` of its noise (power) were there."""
+        self.noise = self.noise.smoothing_for(part)
+        frequency = np.linspace(0.0, 0.5 * self.data.rate, 1000)
+        self.grain = GRAINS * self.noise.rms * float(np.sqrt(np.mean(self.noise.smoother(frequency) ** 2)))
+        self._cache = Cache()
+
+    def read_noise(self, stage: Stage) -> float:
+        """Return the noise (m rms) of a recorded reading, of which rows may be means."""
+        return self.noise.rms if self.data.averaged == 1 else Noise.of(stage, self.data.as_recorded()).rms
+
+    def damp_below(self, speed: float) -> None:
+        """Take `speed` (m/s) as that below which micro-damping acts."""
+        self.stage = self.stage.with_changes(stage={"micro_damping_speed": speed})
+
+    def force_of(self, effect: Effect, segment: Segment, path: Path) -> Floats:
+        """Return the force (N, (K,)) that the motion needs for an effect that adds one."""
+        given = self._given(segment)
+        f = forces(self.stage, [effect], segment.time, path.x, path.v, path.a, given, self.grain)
+        return np.asarray(-f.others() - around_rows(f.drive))
+
+    def paths(self, sensors: Sequence[Effect] = ()) -> list[Path]:
+        """Return the motion of every segment, what `sensors` did to the reading undone."""
+        return self._cache.of(
+            ("paths", key_of(sensors)), lambda: [self._path(s, sensors) for s in self.data.segments]
+        )
+
+    def _path(self, segment: Segment, sensors: Sequence[Effect], *, smooth: bool = True) -> Path:
+        rate = self.data.rate
+        x = behind_reading(segment, sensors)
+        slow = filtered(x, rate, self.noise.smoother) if smooth else x
+        if self.data.held:
+            measured = second_difference(x, rate)
+            v = filtered(x, rate, self.noise.smoother, derivative=True)
+        else:
+            v = filtered(x, rate, _all, derivative=True)
+            measured = around_rows(filtered(v, rate, _all, derivative=True))
+            v = filtered(v, rate, self.noise.smoother)
+        return Path(slow, v, second_difference(slow, rate), measured)
+
+    def _given(self, segment: Segment) -> Floats:
+        """Return the command (V, (K,)) that acts up to each row."""
+        u = segment.voltage
+        return np.append(u[:1], u[:-1]) if self.data.held else u
+
+    def _drive_side(self, drive: Sequence[Effect], sensors: Sequence[Effect]) -> list[Floats]:
+        own = [e for e in self.stage.chain if e.place is Place.DRIVE and e.name not in {b["name"] for b in
+               self.stage.mechanics.effects}]  # fmt: skip
+        chain = sorted([*own, *drive], key=lambda e: e.order)
+        found = []
+        for s, p in zip(self.data.segments, self.paths(sensors), strict=True):
+            parts = parts_of_drive(chain) if self.data.held else 1
+            f = forces(self.stage, chain, s.time, p.x, p.v, p.a, self._given(s), parts=parts)
+            driven = f.held_drive() if self.data.held else around_rows(f.drive)
+            found.append(driven + around_rows(f.push))
+        return found
+
+    def _base(
+        self,
+        drive: Sequence[Effect],
+        sensors: Sequence[Effect],
+        modifiers: Sequence[Effect],
+        bodies: Sequence[Effect],
+        adding: Sequence[Effect],
+        carried: Carried | None,
+        weights: Floats | None,
+        larger: tuple[float, float],
+    ) -> tuple[list[Group], Group | None]:
+        """Return the base's columns (mass; units of damping and friction; a constant force), the load's.
+
+        The last is how much the friction at hand changes with the command, relative to it.
+        """
+        whole = any(e.whole_friction for e in modifiers)
+        others = sorted((e for e in bodies if not e.behind), key=lambda e: (e.place, e.order))
+        second_masses = [e for e in others if e.moving_mass]
+        on_load = [e for e in others if not e.moving_mass]
+        own = (weights.tobytes(), larger) if weights is not None and whole else ()
+        before: list[Effect] = []
+        if any(e.values.get("external") is not None for e in modifiers):
+            chain = [e for e in self.stage.chain if e.place is Place.DRIVE]
+            before = [*chain, *[e for e in drive if e not in chain]]
+            if any(e.values.get("external") for e in modifiers):
+                before += [e for e in adding if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
+        behind = carried.key if carried is not None else ()
+
+        def driven() -> list[Path]:
+            return self.driven(sensors, carried)
+
+        def mass() -> list[Floats]:
+            found = []
+            for s, p, load in zip(self.data.segments, self.paths(sensors), driven(), strict=True):
+                a = p.measured
+                for some, path in ((second_masses, p), (on_load, load)):
+                    if some:
+                        f = forces(self.stage, some, s.time, path.x, path.v, path.a, s.voltage)
+                        a = (a * f.mass - around_rows(f.push)) / self.stage.mass
+                if carried is not None:
+                    a = a + carried.play.values["share"] * (load.a - p.a)
+                found.append(a)
+            return found
+
+        def units(
+            more: float = 0.0, some: np.ndarray | None = None, times: Floats | None = None
+        ) -> list[Floats]:
+            found = []
+            for s, path in zip(self.data.segments, driven(), strict=True):
+                pushed = replace(s, voltage=(1.0 + more) * s.voltage) if more else s
+                at_hand = weights if whole else None
+                found.append(self._units(pushed, path, before, modifiers, at_hand, some, times, larger))
+            return found
+
+        def of_sizes(sizes: Floats) -> list[Floats]:
+            some = sizes[SPEED_UNITS:] != 0.0
+            if whole:
+                some |= held != 0.0
+            whole_of_it = np.append(sizes[:SPEED_UNITS], 1.0)
+            return [table @ whole_of_it for table in units(some=some, times=sizes[SPEED_UNITS:])]
+
+        def by_load() -> list[Floats]:
+            some = held != 0.0
+            pairs = zip(units(MORE, some, held), units(0.0, some, held), strict=True)
+            return [(more - plain)[:, SPEED_UNITS] / MORE for more, plain in pairs]
+
+        held = self.weights if weights is None else weights
+        speed = self.stage.mechanics.micro_damping_speed
+        key = (key_of(before), key_of(modifiers), key_of(sensors), behind, own)
+        columns = [
+            Group(("mass", key_of(others), key_of(sensors), behind), mass),
+            Group(("units", speed, *key), units, of_sizes, SPEED_UNITS + self.reaches.size),
+            Group(("offset",), lambda: [np.ones(s.time.size) for s in self.data.segments]),
+        ]
+        return columns, Group(("by load", held.tobytes(), *key), by_load) if before else None
+
+    def driven(self, sensors: Sequence[Effect], carried: Carried | None) -> list[Path]:
+        """Return the motion of the load behind a play along each segment; without one, that of the axis."""
+        if carried is None:
+            return self.paths(sensors)
+        m, play, pushes = self.stage.mechanics, carried.play.values, carried.pushes
+        load = Load(
+            play["share"] * m.mass, m.viscous, m.micro_damping, m.micro_damping_speed, carried.weights,
+            self.reaches,
+        )  # fmt: skip
+
+        def path(s: Segment, p: Path) -> Path:
+            start = float(s.time[0])
+            y = behind_play(p.x, self.data.period, play["gap"], play["contact"], load, pushes, start)
+            return Path(y, np.gradient(y, self.data.period), second_difference(y, self.data.rate), p.measured)
+
+        pairs = list(zip(self.data.segments, self.paths(sensors), strict=True))
+        return self._cache.of(
+            ("driven", key_of(sensors), carried.key), lambda: [path(s, p) for s, p in pairs]
+        )
+
+    @property
+    def weights(self) -> Floats:
+        """Believed friction as stiffnesses (N/m) of the units."""
+        found = np.zeros(self.reaches.size)
+        for k, r in self._elements:
+            at = int(np.argmin(np.abs(np.log(self.reaches / r))))
+            found[at] += k * r / self.reaches[at]
+        return found
+
+    def _units(
+        self,
+        segment: Segment,
+        path: Path,
+        before: Sequence[Effect],
+        modifiers: Sequence[Effect],
+        weights: Floats | None,
+        some: np.ndarray | None = None,
+        times: Floats | None = None,
+        larger: tuple[float, float] = AS_IT_IS,
+    ) -> Floats:
+        """Return the force (N, (K, p)) around the rows of damping and of friction units, all or `some`.
+
+        With so many `times` each, their sum instead of them.
+        """
+        motion = np.column_stack([segment.time, path.x, path.v, path.a, self._given(segment)])
+        held, reaches, start = (
+            self.weights if weights is None else weights,
+            self.reaches,
+            self._start(segment),
+        )
+        if some is not None:
+            held, reaches, start = held[some], reaches[some], start[some]
+            times = times[some] if times is not None else None
+        return units_along(
+            self.stage, list(before), list(modifiers), reaches, held, np.ascontiguousarray(motion),
+            self.grain, start, PARTS, times, larger,
+        )  # fmt: skip
+
+    def _start(self, segment: Segment) -> Floats:
+        """Return the deflections (m) of the friction units at the first row of a segment."""
+        if segment.before is None:
+            return np.zeros(self.reaches.size)
+        way, key = segment.before, ("start", float(segment.time[0]), segment.time.size)
+        found: Floats = self._cache.of(key, lambda: [deflections(way, self.reaches)])[0]
+        return found
+
+    def _added(self, entry: Entry, sensors: Sequence[Effect], carried: Carried | None) -> Group:
+        """Return the force that the motion needs for an entry that adds one: behind a play, on the load."""
+        effect = ent.build(entry)
+        load = carried if effect.place is not Place.DRIVE else None
+
+        def made() -> list[Floats]:
+            pairs = zip(self.data.segments, self.driven(sensors, load), strict=True)
+            return [self.force_of(effect, s, p) for s, p in pairs]
+
+        return Group(("added", key_of([effect]), key_of(sensors), load.key if load is not None else ()), made)
+
+    def _carried(
+        self, bodies: Sequence[Effect], adding: Sequence[Effect], weights: Floats | None
+    ) -> Carried | None:
+        """Return what is behind a play of `bodies`, None where there is none."""
+        play = next((e for e in bodies if e.behind and _active(e)), None)
+        pushes = [e for e in adding if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
+        pushes += [e for e in bodies if not e.behind and not e.moving_mass]
+        held = self.weights if weights is None else weights
+        return Carried(play, held, tuple(pushes)) if play is not None else None
+
+
+def _active(effect: Effect) -> bool:
+    """Tell whether an effect is away from the values at which it changes nothing."""
+    neutral = effect.neutral or {}
+    return not neutral or any(effect.values[name] != value for name, value in neutral.items())
+
+
+def _refitted(entry: Entry) -> bool:
+    kind = ent.kind_of(entry)
+    return ent.adds_force(kind) and bool(kind.linear)
+
+
+def _all(frequency: Floats) -> Floats:
+    return np.ones_like(frequency)

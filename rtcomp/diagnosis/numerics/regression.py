@@ -1,0 +1,85 @@
+"""Bounded least squares over blocks with a prior: fitted on some blocks, validated on the others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.numerics.bounded import bounded_minimum
+from rtcomp.kernels import Floats
+
+RIDGE = 1e-9
+"""Part of the columns' mean power that is added to each: columns alike share what they explain."""
+
+
+@dataclass(frozen=True)
+class System:
+    """``y = A c`` in whitened units: y (n,), columns (p, n); numbers of entries' columns by entry."""
+
+    y: Floats
+    columns: Floats
+    of_entry: tuple[slice, ...]
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is believed of the coefficients: mean and precision (p,); precision 0 is no belief. And bounds."""
+
+    mean: Floats
+    precision: Floats
+    low: Floats
+    high: Floats
+
+    def extended(self, count: int) -> Prior:
+        """Return the prior with so many further coefficients, of which nothing is known."""
+        own, more = (self.mean, self.precision, self.low, self.high), (0.0, 0.0, -np.inf, np.inf)
+        return Prior(*(np.append(one, np.full(count, each)) for one, each in zip(own, more, strict=True)))
+
+
+@dataclass(frozen=True)
+class Grams:
+    """Sufficient statistics of ``y = A c`` by block."""
+
+    gram: Floats
+    """(B, p, p)."""
+    cross: Floats
+    """(B, p)."""
+    power: Floats
+    """(B,)."""
+    rows: Floats
+    """(B,)."""
+
+    @classmethod
+    def of(cls, columns: Floats, y: Floats, block: np.ndarray, count: int) -> Grams:
+        """Gather from columns (p, n), y (n,) and the sorted block number of every row (n,)."""
+        edges = np.searchsorted(block, np.arange(count + 1))
+
+        def products(ends: tuple[int, int]) -> tuple[Floats, Floats, float]:
+            part, target = columns[:, slice(*ends)], y[slice(*ends)]
+            return part @ part.T, part @ target, float(target @ target)
+
+        gram, cross, power = zip(*shared(products, pairwise(edges.tolist())), strict=True)
+        return cls(np.array(gram), np.array(cross), np.array(power), np.diff(edges).astype(np.float64))
+
+    def solve(self, use: np.ndarray, prior: Prior, variance: float) -> Floats:
+        """Return the coefficients (p,) fitted on the blocks where `use` (B,) is true.
+
+        `variance` of a row's residual weighs the prior against the rows.
+        """
+        gram, cross = self.gram[use].sum(axis=0), self.cross[use].sum(axis=0)
+        scale = np.sqrt(np.diag(gram))
+        scale = np.where(scale > 0.0, scale, 1.0)
+        weight = prior.precision * variance
+        a = (gram + np.diag(weight)) / np.outer(scale, scale)
+        a += RIDGE * np.eye(scale.size)
+        b = (cross + weight * prior.mean) / scale
+        return np.asarray(bounded_minimum(a, b, prior.low * scale, prior.high * scale)) / scale
+
+    def errors(self, c: Floats, which: np.ndarray) -> Floats:
+        """Return the squared error of coefficients in each block of `which`."""
+        g, h = self.gram[which], self.cross[which]
+        found = self.power[which] - 2.0 * h @ c + np.einsum("i,kij,j->k", c, g, c)
+        return np.asarray(np.maximum(found, 1e-12 * self.power[which] + 1e-300))

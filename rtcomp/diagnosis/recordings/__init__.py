@@ -1,0 +1,1 @@
+"""Recordings as the diagnosis takes them: checked, and cut into segments."""

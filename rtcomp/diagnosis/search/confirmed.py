@@ -1,0 +1,90 @@
+"""Whether an effect shows in the objective that its model was not fitted to.
+
+A model fitted to forces is asked in simulated positions, one fitted to positions in forces. What is really
+missing shows in both; what one of them was bent to fit does not show in the other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.fitted import Fitted
+from rtcomp.diagnosis.forces.replicate import left_by
+from rtcomp.diagnosis.numerics.significance import SURE
+from rtcomp.diagnosis.positions.windows import GROUPS, Windows
+from rtcomp.kernels import Floats
+
+LEAST, MOST = 0.5, 1.5
+"""Part of what an effect does below which nothing is the better guess, above which twice as much is."""
+TURNS = 30
+"""Turns of the robust fit."""
+NOTHING = 1e-12
+"""Part of the squared errors below which what an effect does is lost in rounding."""
+
+
+def denied(fitter: Fitter, model: Fitted, without: Fitted) -> bool:
+    """Tell whether what `model` does beyond the one `without` does not show in the other objective.
+
+    Only where it would if `model` were right, as a replicate of it tells: behind a play, noise of the reading
+    kicks the load another way each time, and the right model does not show.
+    """
+    balance = fitter.balance
+    windows = Windows.of(balance) if fitter.by_force else None
+    if there(*(errors(fitter, m, windows) for m in (model, without))):
+        return False
+    stage = fitter.stage(model, between=True)
+    data = left_by(stage, balance)
+    if data is None:
+        return False
+    other = fitter.on(data)
+    same = windows and windows.on(other.balance)
+    again = [other.fit(list(m.terms), m, steps=0) for m in (model, without)]
+    return there(*(errors(other, m, same) for m in again))
+
+
+def there(having: Sequence[Floats], without: Sequence[Floats]) -> bool:
+    """Tell whether the part that shows is plainly more than nothing, and nearer to all of it than to nothing.
+
+    Where plainly more than all of it is there, something else is.
+    """
+    part, error = shows(having, without)
+    return part > max(LEAST, SURE * error) and part - SURE * error < MOST
+
+
+def shows(having: Sequence[Floats], without: Sequence[Floats]) -> tuple[float, float]:
+    """Return the part of what a model does beyond another one that their errors show, and its standard error.
+
+    Errors are one array (rows,) for each window or block. 1 where all of it is there, 0 where nothing is. The
+    factor of a robust fit: windows that went further off than half of them count by their size, not by its
+    square (Huber 1964, Ann. Math. Stat. 35(1)).
+    """
+    done = [other - own for own, other in zip(having, without, strict=True)]
+    square = np.array([float(np.sum(d**2)) for d in done])
+    along = np.array([float(np.sum(e * d)) for e, d in zip(without, done, strict=True)])
+    whole = np.array([float(np.sum(e**2)) for e in without])
+    if square.sum() <= NOTHING * whole.sum():
+        return 0.0, math.inf
+    part, weight, least = 1.0, np.ones(square.size), math.sqrt(NOTHING * (whole + square).mean())
+    for _ in range(TURNS):
+        off = np.sqrt(np.maximum(whole - 2.0 * part * along + part**2 * square, 0.0))
+        usual = max(float(np.median(off)), least)
+        weight = 1.0 / np.maximum(off, usual)
+        part = float(np.sum(weight * along) / max(np.sum(weight * square), 1e-300))
+    scatter = np.sum((weight * (along - part * square)) ** 2) * square.size / max(square.size - 1, 1)
+    return part, float(np.sqrt(scatter) / max(np.sum(weight * square), 1e-300))
+
+
+def errors(fitter: Fitter, model: Fitted, windows: Windows | None) -> list[Floats]:
+    """Return a model's errors by the objective that it was not fitted to, each (rows,), reserved left out.
+
+    Of position (m) in each of the short simulated `windows`; or without these, as position was fitted to, of
+    force (N) in each block.
+    """
+    if windows is not None:
+        return list(windows.off(fitter.stage(model))[windows.block < GROUPS])
+    balance, force = fitter.balance, fitter.force(model)
+    return [force[balance.block == block] for block in np.flatnonzero(~balance.reserved)]

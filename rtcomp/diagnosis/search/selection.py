@@ -1,0 +1,345 @@
+"""The search: forward with a full refit, a few models kept at a time, backward after each step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+from rtcomp.diagnosis import clock
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.candidates.effects import Candidate
+from rtcomp.diagnosis.candidates.growing import fitted_in_time, grow
+from rtcomp.diagnosis.candidates.screening import Look, Screen, Screened, look
+from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.fitting.baseline import settle
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.fitted import Fitted
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.fitting.stage_of import bias_entry
+from rtcomp.diagnosis.numerics.significance import Null
+from rtcomp.diagnosis.search.acceptance import accepted, doubts, exhausted, pruned, score
+from rtcomp.diagnosis.search.replicates import best, null_of
+from rtcomp.diagnosis.settings import BEAM, LEAST_GAIN, LEVEL, MOST_EFFECTS
+
+NEAR = 1.0
+"""Logarithm of the error over the best one's, up to which a model is an alternative, and grown beside it."""
+LOOKED = 0.5
+"""Part of the time left in which candidates are looked at; the rest is for those that are fitted in full."""
+
+Say = Callable[[float, str], None]
+
+
+@dataclass
+class Search:
+    """What the search did: models by number of effects, nulls, what it had no time for."""
+
+    baseline: Fitted
+    chosen: Fitted
+    null: Null | None = None
+    """Of the chosen model, as it was when its replicates were made."""
+    replicated: Fitted | None = None
+    """That model."""
+    beside: list[Candidate] | None = None
+    """All candidates beside the chosen model, where they were looked at."""
+    alternatives: list[Fitted] = field(default_factory=list)
+    """Models with one entry of the chosen one replaced by another effect."""
+    screened: list[tuple[str, float, float]] = field(default_factory=list)
+    """Name, gain and p-value of each candidate beside the baseline."""
+    cut: bool = False
+    """Whether there was no time to look at all candidates, so that the null is of a few of them."""
+    not_tried: list[str] = field(default_factory=list)
+    dropped: list[str] = field(default_factory=list)
+    """What was found and not kept, and why."""
+    doubted: bool = False
+    """Whether the search ended because its objective was doubted."""
+    denied: bool = False
+    """Whether an effect was left out because the other objective does not show it."""
+    elsewhere: bool = False
+    """Whether friction is settled on another model than the chosen one."""
+
+
+def search(
+    fitter: Fitter,
+    baseline: Fitted,
+    ends: float,
+    say: Say,
+    seed: int = 0,
+    doubted: Callable[[Fitted], bool] | None = None,
+    first: Look | None = None,
+) -> Search:
+    """Return the best model that the one test accepts; stops at the time `ends` (clock.now).
+
+    Stops too where the objective itself is `doubted` because of the best model so far. `first` is the look at
+    all candidates beside the baseline, where there was one.
+    """
+    found = Search(baseline, baseline)
+    everything, short = float(baseline.errors.sum()), False
+    beam, parents = [baseline], {id(baseline): math.inf}
+    grown: list[Fitted] = []
+    passed: list[Fitted] = []
+    for step in range(MOST_EFFECTS + 1):
+        judged = None
+        while beam and judged is None:
+            late = step > 0 and clock.now() > ends
+            at_hand = first if step == 0 else None
+            known = found.beside if fitter.by_force else None
+            seen = _judged(fitter, beam[0], seed + step, say, at_hand, known, ends, late=late)
+            judged = _sound(seen, parents[id(beam[0])])
+            if judged is None:
+                beam.pop(0)
+        if judged is None or judged.null is None:
+            break
+        null = judged.null
+        before = replace(found)
+        found.chosen = found.replicated = beam[0]
+        found.null, found.beside = null, judged.candidates or None
+        found.elsewhere, found.cut = False, judged.cut
+        found.alternatives = [g for g in grown if len(g.terms) == len(beam[0].terms) and g is not beam[0]]
+        _skipped(found, judged.cut)
+        if step == 0:
+            found.screened = _table(judged.candidates, judged.screened, null)
+        done = null.settled(judged.gain, beam[0].errors, LEVEL)
+        if done or step == MOST_EFFECTS or exhausted(fitter, beam[0], everything):
+            break
+        if clock.now() > ends:
+            if short:  # of a step that was cut, only a model that leaves nothing is sure
+                found = replace(before, not_tried=found.not_tried)
+            else:
+                found.not_tried.append(_further(found.chosen))
+            break
+        grown, short = _grown(fitter, beam, judged, null.p_value(judged.gain) < LEVEL, ends)
+        grown += _in_other_forms(fitter, found, grown, ends)
+        _skipped(found, short)
+        fit = [g for g in grown if accepted(fitter, g, _parent(g, beam), null, everything)]
+        good = _distinct(sorted(fit, key=score))[:BEAM]
+        parents = {}
+        next_beam = []
+        for model in good:
+            smaller = pruned(fitter, model, passed, null, everything, ends)
+            parents[id(smaller)] = float(_parent(model, beam).errors.sum())
+            next_beam.append(smaller)
+        passed += good
+        beam = _distinct(sorted(next_beam, key=score))
+        beam = [m for m in beam if _better(fitter, m, found.chosen, null, everything)]
+        if not beam:
+            break
+        if clock.now() < ends:
+            beam, grown = _resettled(fitter, found, beam, grown, parents, ends)
+            everything = float(found.baseline.errors.sum())
+        if doubted is not None and doubted(beam[0]):
+            found.doubted = True
+            break
+    if found.elsewhere:
+        _settled_on_chosen(fitter, found)
+    if fitter.offset and found.chosen.terms:
+        _offset_judged(fitter, found)
+    _solid(fitter, found)
+    return found
+
+
+def _grown(
+    fitter: Fitter, beam: Sequence[Fitted], seen: Look, others: bool, ends: float
+) -> tuple[list[Fitted], bool]:
+    """Return the best of the beam, beside which was `seen`, and with `others` these too, each with one more.
+
+    And whether time cut it short: another is begun only where one that takes as long would end in time.
+    """
+    began = clock.now()
+    grown = grow(fitter, beam[0], seen.candidates, seen.screened, ends)
+    near = [m for m in beam[1:] if score(m) < score(beam[0]) + NEAR]
+    for other in near if others else []:
+        moment = clock.now()
+        if 2.0 * moment - began > ends:
+            return grown, True
+        began = moment
+        grown += grow(fitter, other, *_beside(other, seen), ends)
+        # Both together were begun from what the best had alone, which may be bent to do without this one.
+        last = beam[0].terms[-1:]
+        missing = [t for t in last if t.entry["name"] not in ent.names(other.entries)]
+        grown += fitted_in_time(fitter, other, missing, ends)
+    return grown, clock.now() > ends
+
+
+def _in_other_forms(fitter: Fitter, found: Search, grown: Sequence[Fitted], ends: float) -> list[Fitted]:
+    """Return the best model with its last effect beside other forms of those before it.
+
+    The form that suits them alone may be bent to do without the last.
+    """
+    if not grown:
+        return []
+    names = ent.names(found.chosen.entries)
+    alike = [m for m in found.alternatives if ent.names(m.entries) == names and not m.at_bound]
+    near = [m for m in alike if score(m) < score(found.chosen) + NEAR]
+    last = min(grown, key=score).terms[-1:]
+    return [model for other in near for model in fitted_in_time(fitter, other, last, ends)]
+
+
+def _beside(other: Fitted, seen: Look) -> tuple[list[Candidate], list[Screened]]:
+    """Return the candidates that were `seen` beside another model of equal size, and their gains beside this.
+
+    What an effect changes is much the same beside either; where it begins to be fitted is all that is needed.
+    """
+    own = ent.names(other.entries)
+    pairs = [
+        pair
+        for pair in zip(seen.candidates, seen.screen.beside(other), strict=True)
+        if pair[0].name not in own
+    ]
+    return [candidate for candidate, _ in pairs], [gain for _, gain in pairs]
+
+
+def _better(fitter: Fitter, model: Fitted, chosen: Fitted, null: Null, everything: float) -> bool:
+    """Tell whether a model beats that of the step before: a larger one by the one test."""
+    if len(model.terms) > len(chosen.terms):
+        return accepted(fitter, model, chosen, null, everything)
+    return score(model) < score(chosen)
+
+
+def _skipped(found: Search, cut: bool) -> None:
+    """Say that some effects beside the chosen model were not tried, where time `cut` them off."""
+    what = f"some of {_further(found.chosen)}"
+    if cut and what not in found.not_tried:
+        found.not_tried.append(what)
+
+
+def _further(model: Fitted) -> str:
+    return f"all further effects beside {' and '.join(ent.names(model.entries)) or 'the belief'}"
+
+
+def _offset_judged(fitter: Fitter, found: Search) -> None:
+    """Name the constant force that stood beside all models, where it passes the test beside the chosen one.
+
+    Beside the belief alone it may be little of what there is, and beside what explains the rest much.
+    """
+    fitter.offset = False
+    baseline, without = fitter.fit([]), fitter.fit(found.chosen.terms, found.chosen)
+    named = fitter.fit([*found.chosen.terms, Term.of(bias_entry(1.0))], found.chosen)
+    passed = accepted(fitter, named, without, found.null, float(baseline.errors.sum()))
+    if not passed or doubts(fitter, named, found.null)[-1].why:
+        fitter.offset = True  # it stays what stands beside every model
+        return
+    found.baseline, found.chosen, found.alternatives, found.beside = baseline, named, [], None
+
+
+def _solid(fitter: Fitter, found: Search) -> None:
+    """Leave out effects that are no finding, the most doubtful first, and refit the others."""
+    while found.chosen.terms:
+        doubted = doubts(fitter, found.chosen, found.null)
+        weak = [i for i, doubt in enumerate(doubted) if doubt.why]
+        if not weak:
+            return
+        at = max(weak, key=lambda i: doubted[i].left)
+        found.denied |= doubted[at].denied
+        found.dropped.append(f"{ent.names(found.chosen.entries)[at]} is not named: {doubted[at].why}")
+        kept = [t for i, t in enumerate(found.chosen.terms) if i != at]
+        found.chosen, found.alternatives, found.beside = fitter.fit(kept, found.chosen), [], None
+
+
+def _settled_on_chosen(fitter: Fitter, found: Search) -> None:
+    """Refit the chosen model after friction was settled on one that was not kept: numbers of units moved."""
+    settle(fitter, found.chosen.terms)
+    found.baseline = fitter.fit([])
+    found.chosen = fitter.fit(found.chosen.terms, found.chosen)
+    found.alternatives = _refitted(fitter, found.alternatives)
+
+
+def _resettled(
+    fitter: Fitter,
+    found: Search,
+    beam: list[Fitted],
+    grown: list[Fitted],
+    parents: dict[int, float],
+    ends: float,
+) -> tuple[list[Fitted], list[Fitted]]:
+    """Refit all on yield displacements that suit the best model: those of a poorer one were bent to it.
+
+    Of the models that were `grown`, those that come near the best. Its own numbers were bent as well, so both
+    are settled in turn, as long as the error falls.
+    """
+    best, left, found.elsewhere = beam[0], math.inf, True
+    while best.sse < (1.0 - LEAST_GAIN) ** 2 * left and clock.now() < ends:
+        left = best.sse
+        settle(fitter, best.terms)
+        best = fitter.fit(best.terms, best)
+    found.baseline = fitter.fit([])
+    again = [best, *_refitted(fitter, beam[1:])]
+    parents.update({id(new): parents[id(old)] for new, old in zip(again, beam, strict=True)})
+    near = [g for g in sorted(grown, key=score) if all(g is not m for m in beam)]
+    near = [g for g in near if score(g) < score(beam[0]) + NEAR][:BEAM]
+    return sorted(again, key=score), [*again, *_refitted(fitter, near)]
+
+
+def _refitted(fitter: Fitter, models: Sequence[Fitted]) -> list[Fitted]:
+    """Return models fitted again, each from where it was."""
+    return shared(lambda m: fitter.fit(m.terms, m), models)
+
+
+def until(ends: float, share: float) -> float:
+    """Return the time at which a `share` of that which is left up to `ends` has passed (clock.now)."""
+    now = clock.now()
+    return now + share * max(ends - now, 0.0)
+
+
+def _judged(
+    fitter: Fitter,
+    model: Fitted,
+    seed: int,
+    say: Say,
+    first: Look | None,
+    known: Sequence[Candidate] | None,
+    ends: float,
+    *,
+    late: bool,
+) -> Look:
+    """Return the look beside a model with its null distribution, in a part of the time up to `ends`.
+
+    `first` is that look, where it was taken before; `known` are candidates beside a smaller model. Where it
+    is too `late` for one, only what chance leaves is looked at. Where a belief leaves too little for any
+    effect to matter, a few replicates do, whatever they show.
+    """
+    names = ent.names(model.entries)
+    what = f"beside {' and '.join(names)}" if names else "search"
+    say(0.0, what)
+    if late:
+        first = Look([], [], Screen([], fitter), None)
+    looked = until(ends, LOOKED)
+    seen = first or look(fitter, model, looked, known)
+    say(0.5, what)
+    if not model.terms and exhausted(fitter, model, float(model.errors.sum())):
+        ends = -math.inf
+    return replace(seen, null=null_of(fitter, model, seen.screen, seen.gain, seed, looked, ends))
+
+
+def _sound(seen: Look, parent: float) -> Look | None:
+    """Return what was seen where its model can be judged.
+
+    A model that explains recordings of its own no better than the one before explains the real recording has
+    shown nothing: it put the drive's force on both sides of the balance.
+    """
+    if seen.null is not None and seen.null.noise > parent:
+        return None
+    return seen
+
+
+def _parent(model: Fitted, beam: Sequence[Fitted]) -> Fitted:
+    names = ent.names(model.entries)[:-1]
+    return next(b for b in beam if ent.names(b.entries) == names)
+
+
+def _distinct(models: Sequence[Fitted]) -> list[Fitted]:
+    found: list[Fitted] = []
+    for m in models:
+        if all(sorted(ent.names(m.entries)) != sorted(ent.names(f.entries)) for f in found):
+            found.append(m)
+    return found
+
+
+def _table(
+    made: Sequence[Candidate], screened: Sequence[Screened], null: Null | None
+) -> list[tuple[str, float, float]]:
+    order = best([c.name for c in made], [s.gain for s in screened], len(made))
+    return [
+        (made[i].name, screened[i].gain, null.p_value(screened[i].gain) if null else float("nan"))
+        for i in order
+    ]
