@@ -187,7 +187,7 @@ def _left(balance: ForceBalance, model: Fitted) -> float:
 
 def least_left(fitter: Fitter, terms: Sequence[Term], ends: float) -> float:
     """Return the logarithm of what effects leave, the last of them in the form that suits this objective."""
-    settle(fitter, terms)
+    settle(fitter, terms, ends)
     same = fitter.fit(terms)
     forms = in_better_form(fitter, [same], ends) if terms else []
     models = [same, *(fitter.fit([*terms[:-1], form], same) for form in forms)]

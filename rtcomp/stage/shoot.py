@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 
+from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics import Place, wires
 from rtcomp.physics.program import COUNT, Program, renew, run_chain
@@ -29,7 +30,7 @@ from rtcomp.physics.wires import (
     VELOCITY,
     VOLTS,
 )  # fmt: skip
-from rtcomp.stage.simulate import integrate, largest_step, largest_stiffness
+from rtcomp.stage.simulate import MOST_IN_ALL, integrate, largest_step, largest_stiffness
 from rtcomp.stage.stage import Stage
 
 WIDER = 2.0
@@ -51,7 +52,7 @@ def shoot(
     The recorded motion is `time` (s, equally spaced), true `position` (m), `velocity` (m/s) and `voltage` (V,
     held from row to row), each (K,). Every start must leave `rows` rows; the first position of each is the
     recorded one. Sensors are left out. Steps are `coarse` times as long as in a simulation, where speed
-    counts for more than the last digits.
+    counts for more than the last digits. Raises ConfigError where that asks for more than MOST_IN_ALL.
     """
     starts = np.sort(np.asarray(starts, dtype=np.int64))
     if rows < 1 or (starts.size and (starts[0] < 0 or starts[-1] + rows > time.size)):
@@ -61,12 +62,17 @@ def shoot(
     period = float((time[-1] - time[0]) / max(time.size - 1, 1))
     stroke = WIDER * float(np.abs(position).max(initial=0.0))
     count = max(1, math.ceil(period / (coarse * largest_step(stage, stroke)) - 1e-9))
+    longest = min((e.longest_step() for e in moving), default=math.inf)
+    led = max(1, math.ceil(period / longest - 1e-9))
+    if starts.size * rows * count + time.size * led > MOST_IN_ALL:
+        raise ConfigError(
+            f"the stage cannot be simulated in reasonable time: {starts.size} windows of {rows} rows need "
+            f"{count} steps a row, all together at most {MOST_IN_ALL:g}"
+        )
     base = np.array([stage.mass, stage.force_constant, largest_stiffness(stage, stroke), 0.0])
     motion = np.ascontiguousarray(np.column_stack([time, position, velocity, voltage]))
     out = np.empty((starts.size, rows))
     w = np.zeros(wires.COUNT)
-    longest = min((e.longest_step() for e in moving), default=math.inf)
-    led = max(1, math.ceil(period / longest - 1e-9))
     _shoot(program.steps, program.p, program.s, w, base, motion, starts, period, led, count, out)
     return out
 

@@ -38,6 +38,10 @@ from rtcomp.physics.wires import (
 )  # fmt: skip
 from rtcomp.stage.stage import Stage
 
+MOST_IN_ALL = 20_000_000
+"""Steps along all rows of a recording, beyond which a simulation that a fit asks for is not begun: of what is
+so stiff, or so damped on so little mass, no row tells, and it would take minutes. Usual are a million."""
+
 
 @compiled
 def impulse_scale(tangent: float, mass: float, h: float) -> float:

@@ -23,9 +23,10 @@ from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.stage_of import stage_of
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.forces.blocks import reserved_blocks
-from rtcomp.diagnosis.forces.replicate import replicate
+from rtcomp.diagnosis.forces.replicate import left_by, replicate
 from rtcomp.diagnosis.mismatch.where import as_force, as_seen, noise_seen
 from rtcomp.diagnosis.numerics.regression import Grams
+from rtcomp.diagnosis.positions.windows import Windows
 from rtcomp.diagnosis.recordings.data import MOST_ROWS, load_data
 from rtcomp.diagnosis.verdict.validation import Reserved
 from rtcomp.errors import ConfigError, RecordingError
@@ -197,6 +198,17 @@ def test_a_replicate_of_averaged_rows_is_read_in_counts() -> None:
     assert segment.position == pytest.approx(
         segment.source.position.reshape(-1, data.averaged).mean(axis=1), abs=1e-12
     )
+
+
+def test_a_stage_faster_than_any_row_tells_has_no_replicate_and_is_far_off() -> None:
+    """Damping on hardly any mass: its simulation would not end, nor listen to Ctrl-C."""
+    believed = stage()
+    balance = ForceBalance(believed, load_data([run(believed, there_and_back(20.0))]))
+    baseline(balance)
+    quick = stage(mass=2e-3, micro_damping=1e5)
+    assert left_by(quick, balance) is None
+    low, high = balance.data.stroke
+    assert np.abs(Windows.of(balance).off(quick)) == pytest.approx(high - low)
 
 
 def test_a_fit_is_blind_to_reserved_rows() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rtcomp.errors import ConfigError
 from rtcomp.stage.shoot import shoot
 from rtcomp.stage.simulate import Simulator, largest_step, largest_stiffness
 from rtcomp.stage.stage import Stage
@@ -93,6 +94,14 @@ def test_windows_outside_the_recording_are_refused(start, rows):
     time = np.arange(1500) * PERIOD
     with pytest.raises(ValueError, match="do not lie within"):
         shoot(PENDULUM, time, time, time, time, np.array([start]), rows)
+
+
+def test_what_no_row_tells_of_is_not_simulated() -> None:
+    """So much damping on so little mass asks for a million steps a row: that would end after hours."""
+    time, position, velocity, voltage = simulated(PENDULUM)
+    quick = PENDULUM.with_changes(stage={"mass": 6.5e-6, "viscous": 3e2})
+    with pytest.raises(ConfigError, match="cannot be simulated in reasonable time: 1 windows of 100 rows"):
+        shoot(quick, time, position, velocity, voltage, np.array([200]), 100)
 
 
 @pytest.mark.parametrize("size", [2e-4, 3e-3])

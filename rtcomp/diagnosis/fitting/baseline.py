@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
+from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting.fit import Fitter
@@ -52,7 +55,7 @@ def baseline(balance: ForceBalance) -> Fitted:
     return fitter.fit([])
 
 
-def _damp(fitter: Fitter, terms: Sequence[Term]) -> None:
+def _damp(fitter: Fitter, terms: Sequence[Term], ends: float) -> None:
     """Let micro-damping act below the speed that fits best: near the believed one, or any of the motion.
 
     What friction does at low speed is steep in it: a few per cent off look like another effect.
@@ -71,7 +74,7 @@ def _damp(fitter: Fitter, terms: Sequence[Term]) -> None:
             balance.speed_room = ROOM * float(found.coefficients[balance.faster - 1])
         speed, before = balance.speed_of(found.coefficients), balance.stage.mechanics.micro_damping_speed
         balance.damp_below(speed)
-        if abs(np.log(speed / before)) < SETTLED_SPEED:
+        if abs(np.log(speed / before)) < SETTLED_SPEED or clock.now() > ends:
             return
         terms = found.terms
 
@@ -111,13 +114,14 @@ def with_offset(fitter: Fitter, fitted: Fitted) -> Fitted:
     return fitted
 
 
-def settle(fitter: Fitter, terms: Sequence[Term] = ()) -> None:
-    """Put yield displacements, smoothing and the speed of micro-damping to what a model of `terms` has."""
-    if not fitter.by_force:
-        return
-    _put_grid(fitter, terms)
-    _smooth(fitter, terms)
-    _damp(fitter, terms)
+def settle(fitter: Fitter, terms: Sequence[Term] = (), ends: float = math.inf) -> None:
+    """Put yield displacements, smoothing and the speed of micro-damping to what a model of `terms` has.
+
+    As far as the time `ends` (clock.now) allows: each is begun only before.
+    """
+    for step in (_put_grid, _smooth, partial(_damp, ends=ends)):
+        if fitter.by_force and clock.now() < ends:
+            step(fitter, terms)
 
 
 def _smooth(fitter: Fitter, terms: Sequence[Term]) -> None:

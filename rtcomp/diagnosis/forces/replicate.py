@@ -19,7 +19,7 @@ from rtcomp.kernels import Floats, compiled
 from rtcomp.physics import Place, wires
 from rtcomp.physics.program import COUNT, Program, run_chain
 from rtcomp.stage.shoot import WIDER
-from rtcomp.stage.simulate import integrate, largest_step, largest_stiffness
+from rtcomp.stage.simulate import MOST_IN_ALL, integrate, largest_step, largest_stiffness
 from rtcomp.stage.stage import Stage
 
 if TYPE_CHECKING:
@@ -47,6 +47,9 @@ def replicate(stage: Stage, data: Data, motion: list[Floats], noise: float, seed
     recorded = data.as_recorded()
     rest = max(math.sqrt(max(noise**2 - counts**2 / 12.0, 0.0)), DITHER * counts)
     stage = stage.with_changes(sensor={"noise": rest, "resolution": counts})
+    along = zip(recorded.segments, motion, strict=True)
+    if sum(s.time.size * _parts(stage, recorded, x) for s, x in along) > MOST_IN_ALL:
+        return None
     made: list[Segment] = []
     for means, segment, x in zip(data.segments, recorded.segments, motion, strict=True):
         followed = x if segment is means else np.interp(segment.time, means.time, x)
@@ -102,7 +105,7 @@ def _simulated(
         command = 0.5 * (command + np.append(command[1:], command[-1:]))  # held from here to the next
     period = data.period / finer
     stroke = WIDER * float(np.abs(motion).max())
-    steps = max(1, math.ceil(period / largest_step(stage, stroke) - 1e-9))
+    steps = _parts(stage, data, motion) // finer
     base = np.array([stage.mass, stage.force_constant, largest_stiffness(stage, stroke), 0.0])
     w = np.zeros(wires.COUNT)
     w[wires.MASS] = stage.mass
@@ -122,6 +125,13 @@ def _simulated(
     if finer > 1:  # what acts at a row is the mean of what was held before and after it
         volts = 0.5 * (volts + np.append(volts[:1], volts[:-1]))
     return out[0, ::finer].copy(), volts[::finer].copy()
+
+
+def _parts(stage: Stage, data: Data, motion: Floats) -> int:
+    """Return the integration steps of a row along a motion (m, (K,)): what is stiff is resolved."""
+    finer = 1 if data.held else FINER
+    step = largest_step(stage, WIDER * float(np.abs(motion).max()))
+    return finer * max(1, math.ceil(data.period / finer / step - 1e-9))
 
 
 def _between(signal: Floats, finer: int) -> Floats:

@@ -260,7 +260,7 @@ def _resettled(
     best, left, found.elsewhere = beam[0], math.inf, True
     while best.sse < (1.0 - LEAST_GAIN) ** 2 * left and clock.now() < ends:
         left = best.sse
-        settle(fitter, best.terms)
+        settle(fitter, best.terms, ends)
         best = fitter.fit(best.terms, best)
     found.baseline = fitter.fit([])
     again = [best, *_refitted(fitter, beam[1:])]
