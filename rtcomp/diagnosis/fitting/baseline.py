@@ -16,6 +16,7 @@ from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.forces.replicate import left_by
+from rtcomp.diagnosis.forces.signals import FURTHEST
 from rtcomp.diagnosis.settings import LEAST_GAIN
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
@@ -26,8 +27,6 @@ SPEEDS = 9
 """Speeds below which micro-damping may act, where the belief has none."""
 STEPS = 4
 """Times that a believed speed is moved to where a fit has it, at most."""
-ROOM = 0.5
-"""Change of the speed's logarithm, where it is not believed, that a fit may make at a time."""
 SETTLED_SPEED = 2e-3
 """Relative change of that speed at which it is settled."""
 FINER = 3
@@ -58,12 +57,14 @@ def baseline(balance: ForceBalance) -> Fitted:
 def _damp(fitter: Fitter, terms: Sequence[Term], ends: float) -> None:
     """Let micro-damping act below the speed that fits best: near the believed one, or any of the motion.
 
-    What friction does at low speed is steep in it: a few per cent off look like another effect.
+    What friction does at low speed is steep in it: a few per cent off look like another effect. One that is
+    not believed is looked for, and from there moved with all other numbers, as a believed one is.
     """
     balance = fitter.balance
     if balance.without("micro_damping"):
         return
     if balance.believed_speed is None:
+        balance.speed_room = 0.0
         _search_speed(fitter, terms)
     else:
         balance.damp_below(balance.believed_speed)  # a poorer model may have bent it
@@ -71,7 +72,7 @@ def _damp(fitter: Fitter, terms: Sequence[Term], ends: float) -> None:
     for _ in range(STEPS):
         found = fitter.fit(terms, found)
         if balance.believed_speed is None:
-            balance.speed_room = ROOM * float(found.coefficients[balance.faster - 1])
+            balance.speed_room = FURTHEST * float(found.coefficients[balance.faster - 1])
         speed, before = balance.speed_of(found.coefficients), balance.stage.mechanics.micro_damping_speed
         balance.damp_below(speed)
         if abs(np.log(speed / before)) < SETTLED_SPEED or clock.now() > ends:

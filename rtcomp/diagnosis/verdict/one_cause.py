@@ -22,7 +22,7 @@ OFF = np.geomspace(1e-3, BELIEF_SD, 20)
 """How far numbers of a belief may be off each by itself, relative (standard deviations, equally likely)."""
 WRONG = 1.0
 """How far a number is off, in its logarithm (standard deviation), that is not off but wrong: the reach of a
-friction of another shape, a mass without its load. One in 1 / LEVEL is."""
+friction of another shape, a mass without its load. One in a hundred is (LEVEL)."""
 MOST_WRONG = 3
 """Numbers of a belief that may be wrong at once."""
 
