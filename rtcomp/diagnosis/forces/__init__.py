@@ -1,1 +1,1 @@
-"""The objective that judges by force: both sides of the force balance, its noise, its blocks."""
+"""The objective that judges by force: the force balance, its noise and blocks, in which units it closes."""

@@ -47,8 +47,10 @@ def replicate(stage: Stage, data: Data, motion: list[Floats], noise: float, seed
     recorded = data.as_recorded()
     rest = max(math.sqrt(max(noise**2 - counts**2 / 12.0, 0.0)), DITHER * counts)
     stage = stage.with_changes(sensor={"noise": rest, "resolution": counts})
+    finer = _finer(data)
     along = zip(recorded.segments, motion, strict=True)
-    if sum(s.time.size * _parts(stage, recorded, x) for s, x in along) > MOST_IN_ALL:
+    steps = sum(s.time.size * finer * _steps(stage, recorded.period / finer, x) for s, x in along)
+    if steps > MOST_IN_ALL:
         return None
     made: list[Segment] = []
     for means, segment, x in zip(data.segments, recorded.segments, motion, strict=True):
@@ -99,13 +101,13 @@ def _simulated(
     follows = stage.controller is not None and segment.reference is not None
     target = segment.reference if follows and segment.reference is not None else motion
     command = np.zeros_like(segment.voltage) if follows else segment.voltage
-    finer = 1 if data.held else FINER
+    finer = _finer(data)
     if finer > 1:
         target, command = _between(target, finer), _between(command, finer)
         command = 0.5 * (command + np.append(command[1:], command[-1:]))  # held from here to the next
     period = data.period / finer
     stroke = WIDER * float(np.abs(motion).max())
-    steps = _parts(stage, data, motion) // finer
+    steps = _steps(stage, period, motion)
     base = np.array([stage.mass, stage.force_constant, largest_stiffness(stage, stroke), 0.0])
     w = np.zeros(wires.COUNT)
     w[wires.MASS] = stage.mass
@@ -127,11 +129,15 @@ def _simulated(
     return out[0, ::finer].copy(), volts[::finer].copy()
 
 
-def _parts(stage: Stage, data: Data, motion: Floats) -> int:
-    """Return the integration steps of a row along a motion (m, (K,)): what is stiff is resolved."""
-    finer = 1 if data.held else FINER
+def _finer(data: Data) -> int:
+    """Return at how many times the rate of the recording its command is played."""
+    return 1 if data.held else FINER
+
+
+def _steps(stage: Stage, period: float, motion: Floats) -> int:
+    """Return in how many steps a period (s) along a motion (m, (K,)) resolves what is stiff."""
     step = largest_step(stage, WIDER * float(np.abs(motion).max()))
-    return finer * max(1, math.ceil(data.period / finer / step - 1e-9))
+    return max(1, math.ceil(period / step - 1e-9))
 
 
 def _between(signal: Floats, finer: int) -> Floats:
