@@ -55,8 +55,9 @@ def for_axis(unit: str, axis: str) -> str:
 def power_of(base: str, unit: str) -> int:
     """Return the power of `base` (``"m"``, ``"N"`` or ``"s"``) in a unit such as ``"N s/m"``.
 
-    A kilogram is a N s^2/m.
+    A kilogram is a N s^2/m, and a moment (N m) a rotary axis's N.
     """
+    unit = "N" if unit == _ROTARY["N"] else unit
     above, _, below = unit.replace("kg", "N s^2/m").partition("/")
     found = 0
     for part, sign in ((above, 1), (below, -1)):

@@ -58,6 +58,11 @@ def goes_by_time(kind: type[Effect]) -> bool:
     return not once_or_wave and bool(_by_time(cast(Hashable, kind)))
 
 
+def goes_by_friction(kind: type[Effect]) -> bool:
+    """Tell whether what an effect does goes by the force that the friction model holds."""
+    return bool(_by_friction(cast(Hashable, kind)))
+
+
 @cache
 def _adds_force(kind: Any) -> bool:
     if kind.place is Place.SENSOR or not kind.linear:
@@ -90,10 +95,17 @@ def _by_time(kind: Any) -> bool:
     return not np.allclose(made[0], made[1], rtol=1e-6, atol=1e-12)
 
 
-def _changes(effect: Effect, other: float = 0.0, later: float = 0.0) -> Floats:
+@cache
+def _by_friction(kind: Any) -> bool:
+    effects = [kind.from_dict(kind.example) for _ in range(2)]
+    made = [_changes(effect, held=held) for effect, held in zip(effects, (0.0, 3e-4), strict=True)]
+    return not np.allclose(made[0], made[1], rtol=1e-6, atol=1e-12)
+
+
+def _changes(effect: Effect, other: float = 0.0, later: float = 0.0, held: float = 0.0) -> Floats:
     """Return what an effect changes on the wires along a motion like its example's, beside `other` forces.
 
-    The motion begins so many seconds `later` than the run.
+    The motion begins so many seconds `later` than the run, and friction has `held` so much more (N).
     """
     random = np.random.default_rng(0)
     count = 400
@@ -106,6 +118,7 @@ def _changes(effect: Effect, other: float = 0.0, later: float = 0.0) -> Floats:
     given[:, [wires.REACH, wires.SCALE, wires.MASS, wires.GAIN]] = 1.0
     given[:, [wires.LATE, wires.LATE_MIDWAY, wires.SKEW, wires.STIFFENS, wires.FOLLOWS, wires.SOFTENS]] = 0.0
     given[:, [*ADDED, wires.GRIP, wires.GRIP_LEVEL, wires.GRIP_STIFFNESS]] += other
+    given[:, wires.GRIP] += held
     if other:
         given[:, wires.VOLTS] *= 1.0 + other
     program, made = Program([effect]), given.copy()
@@ -219,6 +232,22 @@ def units_of(entry: Mapping[str, Any]) -> list[str]:
     """Return the unit of each of these sizes."""
     kind = kind_of(entry)
     return [parameter(kind, name).unit for name, quarters in _sized(entry) for _ in quarters or (0.0,)]
+
+
+def amounts_of(entry: Mapping[str, Any]) -> dict[str, float]:
+    """Return the linear parameters that the entry states, by name: of a wave one, whatever its phase."""
+    return {n: float(entry[n]) for n in kind_of(entry).linear if n in entry}
+
+
+def all_amounts(entries: Sequence[Mapping[str, Any]]) -> Floats:
+    """Return the linear parameters that entries state, one after the other."""
+    return np.array([amount for entry in entries for amount in amounts_of(entry).values()])
+
+
+def turns(entry: Mapping[str, Any]) -> bool:
+    """Tell whether an entry is a wave that repeats with the angle itself, as a weight: it has no period."""
+    units = {p.unit for p in kind_of(entry).parameters}
+    return PHASE in units and not units & {"m", "Hz"} and bool(entry.get(AMPLITUDE))
 
 
 def with_other_unit(unit: str, size: float) -> Entry:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
-from rtcomp.physics.closing import ASYMMETRY, ClosingBranches
+from rtcomp.physics.closing import ASYMMETRY, SOFTENING, ClosingBranches
 from rtcomp.physics.effect import Effect, Parameter, Place
 from rtcomp.physics.softening import softened
 from rtcomp.physics.wires import FRICTION, GRAIN, GRIP, GRIP_LEVEL, MOVED, REACH, SCALE, SOFTENS
@@ -39,6 +40,11 @@ def non_congruent_friction(p: Floats, s: Floats, w: Floats) -> None:
 def non_congruent_elements(p: Floats, s: Floats, w: Floats) -> None:
     """p: softening (1)."""
     w[SOFTENS] = p[0]
+
+
+@effect_kernel
+def non_congruent_branches(p: Floats, s: Floats, w: Floats) -> None:
+    """p: softening (1), which the companion bends branches by."""
 
 
 @register
@@ -106,7 +112,9 @@ class NonCongruentFriction(Effect):
 
     In the form `force` the friction model's force F is bent: steeper by 1 + softening at zero force, less
     steep by 1 - softening at its level, where it is unchanged. In the form `elements` so is the force of each
-    element of a friction model by its deflection over its reach; a model without elements is one element. A
+    element of a friction model by its deflection over its reach; a model without elements is one element. In
+    the form `branches` a branch that begins at the force F_r is steeper by 1 + softening (1 - |F_r| / level)
+    than the model's own, and leads to where that does (`ClosingBranches`). A
     bent output keeps what a memory without drift needs: closed loops stay closed, wiping-out holds, and loops
     dissipate; only congruency is lost. For that the bend of the whole force must be monotone (softening at
     most 1), or small loops close to the level would give energy. An element is a spring that slips at its
@@ -116,13 +124,18 @@ class NonCongruentFriction(Effect):
 
     name = "non-congruent-friction"
     place = Place.FRICTION
-    parameters = (
-        Parameter("softening", "1", -1.0, 10.0, "loss of slope from middle to level", high_in=MONOTONE),
-    )
+    parameters = (replace(SOFTENING, high_in=MONOTONE),)
     kernel = non_congruent_friction
-    forms = {"force": non_congruent_friction, "elements": non_congruent_elements}
+    forms = {
+        "force": non_congruent_friction,
+        "elements": non_congruent_elements,
+        "branches": non_congruent_branches,
+    }
     says = "contacts are softer the more they carry: loops at high force are flatter than those around zero"
-    equation = "F <- F (1 + softening (1 - |F| / level)), or z_i <- z_i (1 + softening (1 - |z_i| / r_i))"
+    equation = (
+        "F <- F (1 + softening (1 - |F| / level)), or z_i <- z_i (1 + softening (1 - |z_i| / r_i)), "
+        "or branches of exponent 1 + softening (1 - |F_r| / level)"
+    )
     source = "Mayergoyz (1991), Mathematical Models of Hysteresis; Kuhnen (2003), European J. Control 9(4)"
     signature = "residual force odd in the friction force, largest at half of its level"
     experiment = "equal small reversals started from different forces"
@@ -136,3 +149,9 @@ class NonCongruentFriction(Effect):
         super().__init__(**values)
         if self.form == "elements":  # told to the model before it runs
             self.order, self.whole_friction = 15, False
+
+    def companions(self) -> list[Effect]:
+        """Return what bends the branches, in that form."""
+        if self.form != "branches":
+            return []
+        return [ClosingBranches(softening=self.values["softening"])]

@@ -80,10 +80,10 @@ def of_axis(recording: Recording, axis: str) -> Recording:
     return replace(recording, metadata={"stage": json.dumps(stage(axis=axis).to_dict())})
 
 
-def measured(name: str) -> Path:
-    """Return where a measured recording is, a file or a folder; skip the test where it is not at hand."""
+def at_hand(name: str) -> Path:
+    """Return a file or folder of what is shared beside the project; skip the test where it is not at hand."""
     shared = Path(os.environ.get("RTCOMP_SHARED", Path(__file__).parents[3] / "shared/data"))
-    path = shared / "real" / name
+    path = shared / name
     if not path.exists():
-        pytest.skip(f"needs the measured recording {path}; set RTCOMP_SHARED to the folder that holds real/")
+        pytest.skip(f"needs {path}; set RTCOMP_SHARED to the folder that holds {name.split('/')[0]}")
     return path

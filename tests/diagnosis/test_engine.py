@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from recorded import measured
+from recorded import at_hand
 
 from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.result import Diagnosis
@@ -114,7 +114,7 @@ def test_cogging_is_found_with_its_size_and_period(cogging: Diagnosis) -> None:
 
 def emps(budget: float) -> Diagnosis:
     """Return what is said of the measured drive; skip the test where its recording is not at hand."""
-    path = measured("emps/DATA_EMPS.mat")
+    path = at_hand("real/emps/DATA_EMPS.mat")
     columns = {"time": "t", "reference": "qg", "position": "qm", "voltage": "vir"}
     return diagnose(Stage.load(shipped("emps_belief.yaml")), [read(path, columns)], budget=budget)
 
@@ -137,7 +137,7 @@ def test_an_answer_that_was_cut_short_predicts_no_worse_than_the_refitted_stage(
 @pytest.mark.slow
 def test_hysteresis_of_the_bouc_wen_benchmark_is_named_from_a_linear_belief() -> None:
     """Its stage says nothing of the noise, and a filter near half the rate hides how much there is."""
-    path = measured("bouc-wen/train.csv.gz")
+    path = at_hand("real/bouc-wen/train.csv.gz")
     section = {"mass": 2.0, "viscous": 10.0, "force_constant": 1.0, "voltage_limit": 1000.0}
     spring = {"name": "parallel-spring", "stiffness": 1e5}
     believed = Stage.from_dict({"stage": {**section, "effects": [spring]}})

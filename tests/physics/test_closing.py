@@ -1,4 +1,4 @@
-"""Asymmetric branches that close: against their closed form, and what a memory without drift must keep."""
+"""Bent branches that close: against their closed form, and what a memory without drift must keep."""
 
 from __future__ import annotations
 
@@ -21,6 +21,10 @@ LEVEL = CURVE.level
 
 def closing(asymmetry: float) -> physics.Effect:
     return physics.build({"name": "asymmetric-friction", "asymmetry": asymmetry, "closing": 1.0})
+
+
+def softer(softening: float) -> physics.Effect:
+    return physics.build({"name": "non-congruent-friction", "form": "branches", "softening": softening})
 
 
 def force(x: np.ndarray, *effects: physics.Effect) -> np.ndarray:
@@ -56,45 +60,72 @@ def test_the_first_branch_is_as_much_stiffer_as_asked_for() -> None:
         assert (up + down) / (up - down) == pytest.approx(a, rel=1e-3)
 
 
+def test_the_first_branch_is_steeper_by_the_softening_and_those_from_sliding_are_the_models() -> None:
+    s = 0.8
+    first = path(REACH)
+    plain, bent = force(first) / LEVEL, force(first, softer(s)) / LEVEL
+    np.testing.assert_allclose(bent, 1.0 - (1.0 - plain) ** (1.0 + s), atol=1e-9)
+    slid = path(-3e-5, 3e-5, -1e-5)
+    last = np.arange(slid.size) > np.argmin(slid)
+    np.testing.assert_allclose(force(slid, softer(s))[last], force(slid)[last], atol=1e-9 * LEVEL)
+
+
+def test_equal_branches_differ_by_the_force_at_which_they_begin_only_when_bent() -> None:
+    def back(*effects: physics.Effect, turn: float) -> float:
+        f = force(path(3e-5, -3e-5, -3e-5 + turn, -3e-5 + turn - 2e-7), *effects)
+        return float(f[-5] - f[-1])
+
+    turns = (2e-6, 6e-6, 3e-5)  # at which up to the level is reached
+    alike = [back(turn=t) for t in turns]
+    np.testing.assert_allclose(alike, alike[0], rtol=1e-9)
+    bent = [back(softer(0.8), turn=t) for t in turns]
+    assert bent[1] > 1.1 * bent[2] and bent[2] == pytest.approx(alike[0], rel=1e-6)
+
+
 corners = st.lists(st.floats(-6e-6, 6e-6), min_size=1, max_size=8)
+kinds = st.one_of(st.floats(-0.9, 0.9).map(closing), st.floats(-0.9, 9.0).map(softer))
 
 
 @settings(max_examples=100, deadline=None)
-@given(corners, st.floats(-0.9, 0.9), st.floats(0.02, 0.95))
+@given(corners, kinds, st.floats(0.02, 0.95))
 def test_every_loop_closes_that_does_not_reach_the_turn_before(
-    places: list[float], a: float, part: float
+    places: list[float], bend: physics.Effect, part: float
 ) -> None:
     turns = [3e-5, -3e-5, *places]
     assume(abs(turns[-1] - turns[-2]) > 1e-8)
     before = path(*turns)
     back_and_forth = np.concatenate([np.linspace(0, 1, 60), np.linspace(1, 0, 60)])
     loop = before[-1] + part * (turns[-2] - turns[-1]) * back_and_forth
-    f = force(np.concatenate([before, loop, loop]), closing(a)) / LEVEL
+    f = force(np.concatenate([before, loop, loop]), bend) / LEVEL
     for end in (before.size + loop.size - 1, before.size + 2 * loop.size - 1):
         assert f[end] == pytest.approx(f[before.size - 1], abs=1e-9)
     assert np.abs(f).max() <= 1.0 + 1e-12
 
 
 @settings(max_examples=40, deadline=None)
-@given(corners, st.floats(-0.9, 0.9))
-def test_small_loops_that_closed_are_forgotten(places: list[float], a: float) -> None:
+@given(corners, kinds)
+def test_small_loops_that_closed_are_forgotten(places: list[float], bend: physics.Effect) -> None:
     """Wiping-out: after a return over it, what came between is gone."""
     outer = path(3e-5, -1e-5, 4e-6, -2e-6)
     inner = np.array([p * 0.2 for p in places])
     direct = np.concatenate([outer, outer[-1] + path(5e-6)])
     between = [outer[-1] + 1.5e-6 + 1.2e-6 * np.tanh(p / 1e-6) for p in inner]
     wander = np.concatenate([outer, outer[-1] + path(*(b - outer[-1] for b in between), 5e-6)])
-    assert force(wander, closing(a))[-1] == pytest.approx(force(direct, closing(a))[-1], abs=1e-9 * LEVEL)
+    assert force(wander, bend)[-1] == pytest.approx(force(direct, bend)[-1], abs=1e-9 * LEVEL)
 
 
 @settings(max_examples=40, deadline=None)
-@given(corners, st.floats(-0.3, 0.3), st.floats(0.1, 0.9))
-def test_loops_dissipate(places: list[float], a: float, part: float) -> None:
+@given(
+    corners,
+    st.one_of(st.floats(-0.3, 0.3).map(closing), st.floats(-0.3, 9.0).map(softer)),
+    st.floats(0.1, 0.9),
+)
+def test_loops_dissipate(places: list[float], bend: physics.Effect, part: float) -> None:
     before = path(3e-5, -3e-5, *places)
     way = 1.0 if before[-1] < before[-2] else -1.0
     loop = before[-1] + way * part * 6e-6 * np.concatenate([np.linspace(0, 1, 200), np.linspace(1, 0, 200)])
     x = np.concatenate([before, loop, loop])
-    f = force(x, closing(a))
+    f = force(x, bend)
     last = slice(x.size - loop.size, None)
     work = float(np.sum(np.diff(x[last]) * 0.5 * (f[last][1:] + f[last][:-1])))
     assert work >= -1e-4 * LEVEL * part * 6e-6
@@ -109,13 +140,13 @@ def test_more_reversals_than_are_kept_lose_the_smallest_loops_only() -> None:
 
 
 @settings(max_examples=40, deadline=None)
-@given(st.integers(0, 10_000), st.floats(-0.9, 0.9))
-def test_rounding_at_rest_changes_nothing(seed: int, a: float) -> None:
+@given(st.integers(0, 10_000), kinds)
+def test_rounding_at_rest_changes_nothing(seed: int, bend: physics.Effect) -> None:
     """Where a level is another at each step the held part of it jitters by its last digits."""
     before = path(3e-5, -1e-5, 2e-6)
     random = np.random.default_rng(seed)
     still = before[-1] * (1.0 + 4e-16 * random.integers(-2, 3, 400))
-    f = force(np.concatenate([before, still]), closing(a))
+    f = force(np.concatenate([before, still]), bend)
     np.testing.assert_allclose(f[before.size :], f[before.size - 1], atol=1e-9 * LEVEL)
 
 

@@ -184,13 +184,13 @@ class Fitter:
         Those of the model, (q,), without each block, (B_use, q), and the believed sizes with their signs.
         """
         b = self.balance
-        sizes = np.concatenate([np.zeros(0), *(ent.sizes_of(e) for e in b.believed if effects)])
-        own = slice(b.size, b.size + sizes.size)
+        sizes = ent.all_amounts(b.believed if effects else [])
         sign = np.where(sizes < 0.0, -1.0, 1.0)
 
         def of(c: Floats) -> Floats:
             elements = list(zip(c[b.friction], b.reaches, strict=True))
-            return np.array([*c[: len(BASE)], *level_and_reach(elements), *(sign * c[own])])
+            own = sign * ent.all_amounts(self.believed_as(model, c) if effects else [])
+            return np.array([*c[: len(BASE)], *level_and_reach(elements), *own])
 
         return of(model.coefficients), np.array([of(c) for c in model.without]), sizes
 

@@ -18,10 +18,11 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitting.fitted import Fitted, left_out
 from rtcomp.diagnosis.forces.balance import ForceBalance
-from rtcomp.diagnosis.mismatch.where import ROUNDING, as_white
+from rtcomp.diagnosis.forces.factor import larger_by
+from rtcomp.diagnosis.mismatch.where import ROUNDING, as_force, as_white
 from rtcomp.diagnosis.numerics.regression import Grams, Prior
 from rtcomp.kernels import Floats
-from rtcomp.physics import Effect
+from rtcomp.physics import Effect, Place
 
 if TYPE_CHECKING:
     from rtcomp.diagnosis.fitting.fit import Fitter
@@ -49,9 +50,11 @@ def other_forms(fitter: Fitter, model: Fitted, at: int) -> Floats:
 def variants(fitter: Fitter, model: Fitted, at: int) -> Floats:
     """Return the columns (q, n) that another form of a model's effect number `at` would add by its own law.
 
-    Of a wave its overtones, of what goes by the time of the run another course.
+    Of a wave its overtones; of what goes by the time of the run or by the force of friction another law of
+    that; of what makes friction larger the same cause, which makes it so more or less.
     """
-    return np.concatenate([overtones(fitter, model, model.entries[at]), _courses(fitter, model, at)])
+    courses = _by_its_own(fitter, model, at)
+    return np.concatenate([overtones(fitter, model, model.entries[at]), *courses])
 
 
 def force_of(fitter: Fitter, model: Fitted, at: int) -> Floats:
@@ -123,16 +126,25 @@ def other_beliefs(balance: ForceBalance, model: Fitted, besides: str) -> Floats:
     return np.concatenate(found)
 
 
-def _courses(fitter: Fitter, model: Fitted, at: int) -> Floats:
-    """Return the columns (q, n) of another course in time of a model's effect number `at`.
+def _by_its_own(fitter: Fitter, model: Fitted, at: int) -> Iterator[Floats]:
+    """Go through the columns (q, n) of another law of what a model's effect number `at` goes by."""
+    balance, kind = fitter.balance, ent.kind_of(model.entries[at])
+    if ent.goes_by_time(kind):
+        yield _bent_along(fitter, model, at, balance.plain([s.time for s in balance.data.segments]))
+    if ent.goes_by_friction(kind):
+        own = balance.friction
+        friction = model.coefficients[own] @ model.system.columns[own]
+        yield _bent_along(fitter, model, at, as_force(balance, friction))
+    if kind.place is Place.FRICTION and not (ent.adds_force(kind) or ent.goes_by_time(kind)):
+        larger = balance.plain(larger_by(balance, ent.build(model.entries[at])))
+        if np.ptp(larger) > ROUNDING:
+            yield _bent_along(fitter, model, at, larger)
 
-    None of what does not go by the time of the run.
-    """
-    balance = fitter.balance
-    if not ent.goes_by_time(ent.kind_of(model.entries[at])):
-        return np.zeros((0, model.residual.size))
-    force, time = force_of(fitter, model, at), balance.plain([s.time for s in balance.data.segments])
-    return np.array([as_white(balance, force * bend) for bend in _bent_by(time)])
+
+def _bent_along(fitter: Fitter, model: Fitted, at: int, signal: Floats) -> Floats:
+    """Return the whitened columns (2, n) of the force of a model's effect number `at`, bent by a signal."""
+    force = force_of(fitter, model, at)
+    return np.array([as_white(fitter.balance, force * bend) for bend in _bent_by(signal)])
 
 
 def overtones(fitter: Fitter, model: Fitted, entry: Entry) -> Floats:

@@ -295,7 +295,7 @@ class ForceBalance(Signals):
         chain = [e for e in stage.chain if e.place is Place.DRIVE]
         given, needed = [], []
         for s, p in zip(self.data.segments, self.paths(sensors), strict=True):
-            held = self._given(s)
+            held = self.given(s)
             parts = parts_of_drive(chain) if self.data.held else 1
             over = forces(stage, chain, s.time, p.x, p.v, p.a, held, parts=parts)
             f = forces(stage, stage.chain, s.time, p.x, p.v, p.a, held, self.grain)

@@ -120,7 +120,7 @@ class Signals:
 
     def force_of(self, effect: Effect, segment: Segment, path: Path) -> Floats:
         """Return the force (N, (K,)) that the motion needs for an effect that adds one."""
-        given = self._given(segment)
+        given = self.given(segment)
         f = forces(self.stage, [effect], segment.time, path.x, path.v, path.a, given, self.grain)
         return np.asarray(-f.others() - around_rows(f.drive))
 
@@ -143,7 +143,7 @@ class Signals:
             v = filtered(v, rate, self.noise.smoother)
         return Path(slow, v, second_difference(slow, rate), measured)
 
-    def _given(self, segment: Segment) -> Floats:
+    def given(self, segment: Segment) -> Floats:
         """Return the command (V, (K,)) that acts up to each row."""
         u = segment.voltage
         return np.append(u[:1], u[:-1]) if self.data.held else u
@@ -155,7 +155,7 @@ class Signals:
         found = []
         for s, p in zip(self.data.segments, self.paths(sensors), strict=True):
             parts = parts_of_drive(chain) if self.data.held else 1
-            f = forces(self.stage, chain, s.time, p.x, p.v, p.a, self._given(s), parts=parts)
+            f = forces(self.stage, chain, s.time, p.x, p.v, p.a, self.given(s), parts=parts)
             driven = f.held_drive() if self.data.held else around_rows(f.drive)
             found.append(driven + around_rows(f.push))
         return found
@@ -280,7 +280,7 @@ class Signals:
 
         With so many `times` each, their sum instead of them.
         """
-        motion = np.column_stack([segment.time, path.x, path.v, path.a, self._given(segment)])
+        motion = np.column_stack([segment.time, path.x, path.v, path.a, self.given(segment)])
         held, reaches, start = (
             self.weights if weights is None else weights,
             self.reaches,

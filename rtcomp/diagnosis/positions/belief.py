@@ -96,14 +96,16 @@ class Belief:
             del m["effects"]
         return Stage.from_dict(data)
 
-    def values(self, c: Floats, count: int) -> Floats:
-        """Return mass, damping, level and reach of friction, and `count` sizes by amount, as moved by `c`."""
+    def values(self, c: Floats, amounts: Floats) -> Floats:
+        """Return mass, damping, level and reach of friction, and believed `amounts` (q,), as moved by `c`.
+
+        Those with the sign that is believed.
+        """
         m = self.moved(c, []).mechanics
         friction = m.friction if isinstance(m.friction, list) else []
         held = level_and_reach([(e.stiffness, e.reach) for e in friction]) if friction else (0.0, 0.0)
-        found = [ent.sizes_of(dict(e)) for e in m.effects if is_sized(dict(e))] if count else []
-        own = np.concatenate([np.zeros(0), *found])[:count]
-        sign = np.where(self.sizes[:count] < 0.0, -1.0, 1.0)
+        own = ent.all_amounts([dict(e) for e in m.effects if is_sized(dict(e))])[: amounts.size]
+        sign = np.where(amounts < 0.0, -1.0, 1.0)
         return np.array([*(float(getattr(m, n)) for n in BASE), *held, *(sign * own)])
 
 

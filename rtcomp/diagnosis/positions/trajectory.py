@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitting import starting
@@ -198,9 +199,9 @@ class Trajectory(Fitter):
     def numbers(self, model: Fitted, *, effects: bool) -> tuple[Floats, Floats, Floats]:
         """See `Fitter`."""
         size = len(self.belief.numbers)
-        sizes = self.belief.sizes if effects else np.zeros(0)
-        sets = [self.belief.values(c[:size], sizes.size) for c in model.without]
-        return self.belief.values(model.coefficients, sizes.size), np.array(sets), sizes
+        amounts = ent.all_amounts(self.belief.own if effects else [])
+        sets = [self.belief.values(c[:size], amounts) for c in model.without]
+        return self.belief.values(model.coefficients, amounts), np.array(sets), amounts
 
     def _stage(self, c: Floats, terms: Sequence[Term]) -> Stage:
         return self.belief.moved(c, [t.entry for t in terms])

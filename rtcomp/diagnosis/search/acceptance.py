@@ -139,8 +139,8 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
 def _only_forms(fitter: Fitter, chosen: Fitted, at: int) -> Floats:
     """Return the columns (q, n) of what makes no effect number `at` doubtful where it is left.
 
-    A wave of any form is the same effect, or a drift of any course; the others may be of another form, and
-    the friction of another shape.
+    By another law of what it goes by it is the same effect; the others may be of another form, and the
+    friction of another shape.
     """
     forms = [fitter.forms_of(chosen, j) for j in range(len(chosen.terms)) if j != at]
     return np.concatenate([fitter.variants(chosen, at), fitter.other_friction(chosen), *forms])

@@ -79,6 +79,7 @@ def fixed_units(believed: Stage) -> list[str]:
         # What is given by a list, as a curve through points, stays as it is.
         listed = bool(kind.element) or not kind.parameters
         found += [unit for unit in (FORCE, LENGTH) if listed or any(power_of(unit, u) for u in still)]
+        found += [LENGTH] if ent.turns(dict(effect)) else []
         found.append(kind.other_unit)
     return found
 

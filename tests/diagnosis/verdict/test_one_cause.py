@@ -37,7 +37,8 @@ def numbers(relative: Floats, half: float = 0.02, before: Floats = BEFORE) -> Nu
 @pytest.mark.parametrize(
     ("unit", "base", "power"),
     [("kg", "m", -1), ("kg", "N", 1), ("N s/m", "m", -1), ("m", "m", 1), ("N", "m", 0), ("N/m^3", "m", -3),
-     ("N s^2/m^2", "m", -2), ("N s^2/m^2", "s", 2), ("m/s", "m", 1), ("1", "N", 0), ("N/V", "N", 1)],
+     ("N s^2/m^2", "m", -2), ("N s^2/m^2", "s", 2), ("m/s", "m", 1), ("1", "N", 0), ("N/V", "N", 1),
+     ("N m", "N", 1), ("N m", "m", 0)],
 )  # fmt: skip
 def test_powers_of_a_unit(unit: str, base: str, power: int) -> None:
     assert power_of(base, unit) == power
@@ -105,6 +106,9 @@ def test_a_unit_in_which_something_is_fixed_did_not_move() -> None:
     spring = axis(effects=[{"name": "parallel-spring", "stiffness": 100.0}])
     assert not set(fixed_units(spring)) & {"N", "m"}
     assert one_cause(numbers(1.27**LENGTH), ["m"]) is None
+    weight = axis(axis="rotary", effects=[{"name": "gravity", "amplitude": 0.3}])  # of a turn
+    assert "m" in fixed_units(weight) and "N" not in fixed_units(weight)
+    assert "m" not in fixed_units(axis(effects=[{"name": "gravity", "force": 0.3}]))
 
 
 def test_a_force_constant_is_told_with_its_interval() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from recorded import measured
+from recorded import at_hand
 
 from rtcomp.diagnosis.fitting.baseline import baseline
 from rtcomp.diagnosis.fitting.fit import Fitter
@@ -318,7 +318,7 @@ def test_a_pendulum_as_believed_is_left_in_peace() -> None:
 @pytest.mark.slow
 def test_a_measured_servo_is_not_given_a_wrong_name() -> None:
     """Its authors know it to have friction by load, and more: that is named, or nothing."""
-    folder = measured("servo-pendulum")
+    folder = at_hand("real/servo-pendulum")
     columns = {"voltage": "duty", "enabled": "torque_enabled"}
 
     def gain(number: int) -> list[Recording]:

@@ -15,9 +15,12 @@ from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.other_forms import errors_beside, force_of, overtones
 from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.forces.factor import larger_by
 from rtcomp.diagnosis.mismatch.where import as_white
 from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.search.free_function import rival
+from rtcomp.kernels import Floats
+from rtcomp.physics import build
 
 
 @pytest.mark.parametrize("name", ["cogging", "torque-ripple", "position-dependent-friction"])
@@ -58,22 +61,62 @@ def test_what_only_makes_up_for_the_form_of_a_wave_is_no_candidate() -> None:
     assert most(seen.screened) < 0.3 * most(plainly)
 
 
-def test_another_form_of_a_drift_has_another_course_and_what_does_not_drift_none() -> None:
-    """Fast at first in place of as fast all the time; not so friction that falls with speed."""
-    drifts = {"name": "friction-drift", "form": "linear", "change": 0.4, "time_constant": 20.0}
-    falls = {"name": "stribeck", "rise": 0.3, "velocity": 2e-3}
-    for entry, none in ((drifts, False), (falls, True)):
-        recording = run(stage(effects=[entry]), there_and_back(20.0))
-        balance = ForceBalance(stage(), load_data([recording]))
-        base, fitter = baseline(balance), Fitter(balance)
-        model = fitter.fit([Term.of(entry)], base)
-        forms = fitter.variants(model, 0)
-        assert (forms.size == 0) == none
-        if not none:
-            other = fitter.change(base, {**entry, "form": "level", "time_constant": 6.0})
-            columns = np.concatenate([forms, model.tangents, fitter.change(base, entry)[None, :]])
-            rest = other - np.linalg.lstsq(columns.T, other, rcond=None)[0] @ columns
-            assert np.linalg.norm(rest) < 0.15 * np.linalg.norm(other)
+LAWS: list[tuple[dict[str, Any], dict[str, Any]]] = [
+    (
+        {"name": "friction-drift", "form": "linear", "change": 0.4, "time_constant": 20.0},
+        {"form": "level", "time_constant": 6.0},
+    ),
+    ({"name": "stribeck", "rise": 0.3, "velocity": 2e-3}, {"form": "exponential"}),
+    ({"name": "stiction-ageing", "growth": 0.3, "distance": 2e-5}, {"onset": 0.3}),
+    ({"name": "non-congruent-friction", "softening": 0.5}, {"form": "elements"}),
+]
+"""Effects, and other laws of the same."""
+
+
+@pytest.mark.parametrize(("entry", "other"), LAWS)
+def test_another_law_of_what_an_effect_goes_by_is_the_same_effect(
+    entry: dict[str, Any], other: dict[str, Any]
+) -> None:
+    """The columns make up for a part of what no other numbers of the first law do."""
+    recording = run(stage(effects=[entry]), there_and_back(20.0))
+    balance = ForceBalance(stage(), load_data([recording]))
+    base, fitter = baseline(balance), Fitter(balance)
+    model = fitter.fit([Term.of(entry)], base)
+    law, own = fitter.change(base, {**entry, **other}), fitter.change(base, entry)[None, :]
+
+    def left(forms: Floats) -> float:
+        columns = np.concatenate([forms, model.tangents, own])
+        rest = law - np.linalg.lstsq(columns.T, law, rcond=None)[0] @ columns
+        return float(np.linalg.norm(rest) / np.linalg.norm(law))
+
+    forms = fitter.variants(model, 0)
+    assert left(forms) < 0.9 * left(forms[:0])
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        {"name": "drive-delay", "delay": 2e-3},
+        {"name": "asymmetric-viscous-friction", "ratio": 0.2},
+        {"name": "constant-force", "force": 0.5},
+    ],
+)
+def test_what_goes_by_nothing_of_its_own_has_one_law(entry: dict[str, Any]) -> None:
+    balance = ForceBalance(stage(), load_data([run(stage(effects=[entry]), there_and_back(8.0))]))
+    base, fitter = baseline(balance), Fitter(balance)
+    assert not fitter.variants(fitter.fit([Term.of(entry)], base), 0).size
+
+
+def test_friction_is_larger_by_as_much_as_an_effect_makes_it() -> None:
+    """Where it slides, whatever friction the stage has: here by what the level of Stribeck's curve is."""
+    balance = ForceBalance(stage(), load_data([run(stage(), there_and_back(8.0))]))
+    law = build({"name": "stribeck", "rise": 0.3, "velocity": 2e-3})
+    (larger,), (path,) = larger_by(balance, law), balance.paths()
+    fast = np.abs(path.v) > 2e-4
+    expected = 0.3 * np.exp(-((path.v / 2e-3) ** 2))
+    np.testing.assert_allclose(larger[fast][5:], expected[fast][5:], atol=5e-3)
+    (none,) = larger_by(balance, build({"name": "creep", "fraction": 0.1, "time_constant": 1.0}))
+    assert np.abs(none).max() < 1e-3
 
 
 @pytest.mark.parametrize(("waves", "told"), [(0.5, False), (1.0, False), (3.0, True), (4.0, True)])

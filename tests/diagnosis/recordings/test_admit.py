@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recorded import changed, cut, of_axis, run, stage, there_and_back
+from recorded import at_hand, changed, cut, of_axis, run, stage, there_and_back
 
 from rtcomp.diagnosis.recordings.admit import admit
 from rtcomp.diagnosis.recordings.excitation import reversals
@@ -19,7 +19,6 @@ from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.recording.reader import Recording, read
 from rtcomp.stage.stage import Stage
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 Change = Callable[[Recording], Recording]
 
 
@@ -175,17 +174,15 @@ def test_reversals_are_counted_whatever_the_scale_and_the_direction(
     assert reversals(size * (way * path + noise + centre)) == turns
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason="measured and sealed recordings (../shared/data) are not here")
 @pytest.mark.parametrize("case", range(16))
 def test_concealed_effects_are_no_bad_input(case: int) -> None:
-    folder = DATA / "sealed-dev" / f"dev{case:02d}"
+    folder = at_hand(f"sealed-dev/dev{case:02d}")
     assert admit(Stage.load(folder / "stage.yaml"), [read(folder / "train.csv.gz")]) == []
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason="measured and sealed recordings (../shared/data) are not here")
 def test_measured_recordings_pass_and_their_mistakes_are_told() -> None:
     names = {"time": "t", "position": "qm", "voltage": "vir", "reference": "qg"}
-    emps = read(DATA / "real" / "emps" / "DATA_EMPS.mat", names)
+    emps = read(at_hand("real/emps") / "DATA_EMPS.mat", names)
     belief = stage(
         mass=95.11, force_constant=35.15, viscous=203.5, micro_damping=0.0,
         friction=[{"stiffness": 2e7, "reach": 1e-6}],

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 from bench_benchmarks import MOTOR, motor
 from bench_benchmarks import recording as recording_of
-from recorded import STAGE, run, stage, there_and_back
+from recorded import STAGE, at_hand, run, stage, there_and_back
 
 from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.recordings.admit import admit
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 NEEDED = {"mass": 2.0, "force_constant": 4.0, "voltage_limit": 10.0}
 DEADBAND = {"name": "drive-deadband", "width": 0.2}
 
@@ -48,10 +45,9 @@ def test_numbers_bent_to_a_part_of_the_recordings_are_not_given() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not DATA.is_dir(), reason="measured and sealed recordings (../shared/data) are not here")
 def test_a_measured_motor_of_which_only_the_inertia_is_believed() -> None:
     """Open loop, 100 Hz; the position is the integral of the measured speed."""
-    columns = motor(DATA / "real" / "dc-motor")
+    columns = motor(at_hand("real/dc-motor"))
     thin = Stage.from_dict({"stage": MOTOR, "rate": 100.0})
     turned = recording_of({name: columns[name] for name in ("time", "position", "voltage")})
     admit(thin, [turned])
