@@ -1,7 +1,7 @@
 """What a recording offers to each unit: start values of the parameters of any effect.
 
 A length goes from the sensor's grain to the stroke, a speed over those of the motion, a voltage over those of
-the command, a time from a row to the length of the recording, a frequency to the motion's bandwidth; periods
+the command, a time from a row to the last of the recording, a frequency to the motion's bandwidth; periods
 and tones of waves come from periodograms of the residual.
 """
 
@@ -82,8 +82,8 @@ class Scales:
             (low, high),
             speed,
             _filled(np.unique(np.quantile(u[u > 0], quantiles))) if np.any(u > 0) else np.ones(1),
-            (data.period, data.seconds),
-            (4.0 / data.seconds, min(0.4 * data.rate, balance.noise.bandwidth)),
+            (data.period, data.last),
+            (4.0 / data.last, min(0.4 * data.rate, balance.noise.bandwidth)),
             float(np.sqrt(np.mean(force**2))),
         )
 

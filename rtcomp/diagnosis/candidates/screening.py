@@ -14,6 +14,7 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.candidates.effects import Candidate, candidates
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import ONCE, Fitted
+from rtcomp.diagnosis.fitting.other_forms import any_laws
 from rtcomp.diagnosis.numerics.regression import RIDGE
 from rtcomp.diagnosis.numerics.significance import Null
 from rtcomp.kernels import Floats
@@ -197,8 +198,7 @@ def look(
     But for those of the effects `without`; what is `known` is not made again. Of the model's own effects any
     form of their law stands beside them: what only makes up for the form is no candidate.
     """
-    variants = [fitter.variants(model, i) for i in range(len(model.terms))]
-    beside = np.concatenate([np.zeros((0, fitter.block.size)), *variants])
+    beside = any_laws(fitter, model)
 
     def explained(some: Sequence[Candidate]) -> Floats:
         return Screen(some, fitter, beside).explained(model)

@@ -111,7 +111,7 @@ def _free_of(terms: Sequence[Term], balance: ForceBalance, *, sizes: bool) -> li
                 # Beyond the motion's bandwidth nothing swings that the recording could show; a stiff contact
                 # is as good as a rigid one, and needs not be shown.
                 most = min(p.high, balance.noise.bandwidth if p.default is None else balance.data.rate)
-                step = min(0.02, 0.01 / (value * balance.data.seconds)) if waves else step
+                step = min(0.02, 0.01 / (value * balance.data.last)) if waves else step
             elif p.unit == "s" and p.name not in (kind.neutral or {}):
                 # A scale shorter than a row is no finding; a size may be as small as it is.
                 least = max(p.lowest, min(balance.data.period, value))

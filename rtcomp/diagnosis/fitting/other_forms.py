@@ -57,6 +57,12 @@ def variants(fitter: Fitter, model: Fitted, at: int) -> Floats:
     return np.concatenate([overtones(fitter, model, model.entries[at]), *courses])
 
 
+def any_laws(fitter: Fitter, model: Fitted) -> Floats:
+    """Return the columns (q, n) that another law of each of a model's effects would add."""
+    found = [fitter.variants(model, i) for i in range(len(model.terms))]
+    return np.concatenate([np.zeros((0, model.residual.size)), *found])
+
+
 def force_of(fitter: Fitter, model: Fitted, at: int) -> Floats:
     """Return the force (N, (n,)) of a model's effect number `at`."""
     return fitter.without(model, at) - fitter.force(model)

@@ -82,6 +82,11 @@ class Data:
         """Length of all segments (s)."""
         return float(sum(s.time.size for s in self.segments)) / self.rate
 
+    @property
+    def last(self) -> float:
+        """Time (s) of a run at its last row, gaps included."""
+        return max(float(s.time[-1]) for s in self.segments)
+
     @cached_property
     def jumps(self) -> list[Jump]:
         """The clearest steps of the reading that are unlike those before and after them."""

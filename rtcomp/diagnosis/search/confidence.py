@@ -17,7 +17,7 @@ from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.intervals import told
-from rtcomp.diagnosis.fitting.other_forms import errors_beside, in_any_form, of_position
+from rtcomp.diagnosis.fitting.other_forms import any_laws, errors_beside, in_any_form, of_position
 from rtcomp.diagnosis.numerics.significance import confidence_set, log_gain, probabilities
 from rtcomp.diagnosis.search.replicates import best
 from rtcomp.diagnosis.search.selection import Search
@@ -63,7 +63,7 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         chosen, i = found.chosen, len(done)
         rest = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
         models = [chosen, *_others(fitter, found, i, rest, ends)]
-        errors = [_by_cell(fitter, m, i if m is chosen else len(m.terms) - 1) for m in models]
+        errors = [_by_cell(fitter, m) for m in models]
         errors, rows = above_noise(found, errors, _independent(fitter, chosen) / errors[0].size)
         weight = probabilities(errors, rows, [m.size for m in models])
         least = (1.0 - ALIAS) * log_gain(rest.errors, chosen.errors)
@@ -96,13 +96,14 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
     return done
 
 
-def _by_cell(fitter: Fitter, model: Fitted, at: int) -> Floats:
+def _by_cell(fitter: Fitter, model: Fitted) -> Floats:
     """Return the squared error of a model in every cell that is not reserved, (C,).
 
     What acts now and then, as a drive's limit, shows in some of them: of ten blocks it would be by chance.
-    That in the place `at` is compared in any form of its own.
+    Its effects are compared by any law of what they go by: what stands in the place of one may else make up
+    for the form of another.
     """
-    model = in_any_form(fitter, model, fitter.variants(model, at))
+    model = in_any_form(fitter, model, any_laws(fitter, model))
     block = fitter.block
     cell = np.arange(block.size) * (fitter.blocks * CELLS) // block.size
     used = fitter.use[block]

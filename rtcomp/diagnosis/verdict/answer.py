@@ -12,7 +12,7 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.intervals import Told, believed_sizes, numbers, told
-from rtcomp.diagnosis.fitting.other_forms import in_any_form
+from rtcomp.diagnosis.fitting.other_forms import any_laws, errors_beside, in_any_form
 from rtcomp.diagnosis.fitting.retuned import Numbers, retunings
 from rtcomp.diagnosis.fitting.stage_of import in_units, with_effect
 from rtcomp.diagnosis.fitting.unbiased import unbiased
@@ -47,17 +47,19 @@ class Rest:
 
     @classmethod
     def of(cls, fitter: Fitter, found: Search) -> Rest:
-        """Measure it against the replicates of the chosen model."""
-        error, first = float(found.chosen.errors.sum()), float(found.baseline.errors.sum())
+        """Measure it against replicates of the chosen model, its effects by any law of what they go by."""
+        forms = np.concatenate([fitter.other_friction(found.chosen), any_laws(fitter, found.chosen)])
+        errors = errors_beside(fitter, found.chosen, forms)
+        error, first = float(errors.sum()), float(found.baseline.errors.sum())
         noise = found.null.noise if found.null is not None else math.inf
-        rest = in_any_form(fitter, found.chosen, fitter.other_friction(found.chosen))
+        rest = in_any_form(fitter, found.chosen, forms)
         relative = fitter.above_noise(rest, noise=noise)
         if found.null is None:
             return cls(relative > TOLERANCE, 1.0 if not found.chosen.terms else error / first)
         share = max(error - noise, 0.0) / max(first - noise, 1e-300)
         # Of many small things none of which could be named, the square counts: they do not add up to one.
         matters = relative > TOLERANCE and (not found.chosen.terms or share > LEAST_GAIN)
-        significant = matters and found.null.p_of_error(found.chosen.errors) < LEVEL
+        significant = matters and found.null.p_of_error(errors) < LEVEL
         return cls(significant, min(share, 1.0))
 
 

@@ -77,7 +77,7 @@ def _most(balance: ForceBalance, unit: str, high: float) -> float:
     force = volts * balance.stage.force_constant
     scale = {
         "N": force, "V": volts, "m": span, "N/m": force / span, "N/m^3": force / span**3, "N m": force,
-        "N s/m": force / speed, "N s^2/m^2": force / speed**2, "s": data.seconds / 4.0, "1/m": 1.0 / span,
+        "N s/m": force / speed, "N s^2/m^2": force / speed**2, "s": data.last / 4.0, "1/m": 1.0 / span,
         "1": 1.0,
     }.get(unit, high)  # fmt: skip
     return min(scale, high)

@@ -291,7 +291,7 @@ def test_a_speed_of_micro_damping_that_nobody_believes_moves_with_the_effects(sp
 
 
 def test_a_fit_stays_within_the_range_of_its_form() -> None:
-    """The whole force may soften by 1 at most, elements by more; started beyond that, both are fitted."""
+    """The whole force may soften by 1 at most, the others by more; started beyond that, all are fitted."""
     soft = {"name": "non-congruent-friction", "form": "elements", "softening": 3.0}
     balance = ForceBalance(stage(), load_data([run(stage(effects=[soft]), there_and_back())]))
     base, fitter = baseline(balance), Fitter(balance)
@@ -305,7 +305,7 @@ def test_a_fit_stays_within_the_range_of_its_form() -> None:
         assert model.at_bound == (term.entry["form"] == "force")
         if term.entry["form"] == "elements":
             assert model.entries[0]["softening"] == pytest.approx(3.0, rel=0.02)
-    assert {c.term.entry["form"] for c in made} == {"force", "elements"}
+    assert {c.term.entry["form"] for c in made} == {"force", "elements", "branches"}
 
 
 def test_a_stiff_axis_is_smoothed_less_and_a_soft_one_by_wiener() -> None:
