@@ -75,6 +75,5 @@ def _around(lead: int, edge: int, segment: Segment, first: int, last: int) -> Se
     run_in = int(RUN_IN * (last - first))
     begin = max(first - edge - max(run_in - lead, 0), 0)
     part = segment.part(slice(begin, min(last + 1 + edge, segment.time.size)))
-    earlier = np.zeros(0) if segment.before is None else segment.before
-    before = np.concatenate([earlier, way_to(segment.position, begin)]) if begin else segment.before
+    before = way_to(segment, begin) if begin else segment.before
     return replace(part, before=before, run_in=run_in if begin else segment.run_in)

@@ -16,6 +16,7 @@ from rtcomp.diagnosis.cache import Cache, Group, key_of
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.forces.bank import AS_IT_IS, SPEED_UNITS, deflections, units_along
 from rtcomp.diagnosis.forces.kinematics import Path, second_difference
+from rtcomp.diagnosis.forces.led import led_there
 from rtcomp.diagnosis.forces.noise import Noise
 from rtcomp.diagnosis.forces.play import Carried, Load, behind_play
 from rtcomp.diagnosis.forces.reaches import grid
@@ -197,8 +198,8 @@ class Signals:
                 a = p.measured
                 for some, path in ((second_masses, p), (on_load, load)):
                     if some:
-                        f = forces(self.stage, some, s.time, path.x, path.v, path.a, s.voltage)
-                        a = (a * f.mass - around_rows(f.push)) / self.stage.mass
+                        moving, push = led_there(self.stage, some, s, path)
+                        a = (a * moving - around_rows(push)) / self.stage.mass
                 if carried is not None:
                     a = a + carried.play.values["share"] * (load.a - p.a)
                 found.append(a)
@@ -298,7 +299,7 @@ class Signals:
         """Return the deflections (m) of the friction units at the first row of a segment."""
         if segment.before is None:
             return np.zeros(self.reaches.size)
-        way, key = segment.before, ("start", float(segment.time[0]), segment.time.size)
+        way, key = segment.before[1], ("start", float(segment.time[0]), segment.time.size)
         found: Floats = self._cache.of(key, lambda: [deflections(way, self.reaches)])[0]
         return found
 

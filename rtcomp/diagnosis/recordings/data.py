@@ -42,9 +42,10 @@ class Segment:
     source: Segment | None = None
     """The rows as recorded, where these are means of them."""
     before: Floats | None = None
-    """Positions (m) on the way to its first row, where the recording began earlier: friction remembers."""
+    """Times (s) and positions (m), (2, M), on the way to its first row, where the recording began earlier:
+    friction remembers, and what swings."""
     run_in: int = 0
-    """First rows that are not compared: what swings or lags has no state at the beginning of a window."""
+    """First rows that are not compared: what lags has no state at the beginning of a window."""
 
     def part(self, rows: slice) -> Segment:
         """Return some of its rows."""
@@ -136,12 +137,14 @@ def _after(whole: Segment, rows: slice) -> Segment:
         return part
     gone = np.maximum.accumulate(part.position) - np.minimum.accumulate(part.position)
     far = int(np.searchsorted(gone, FORGOTTEN * float(np.ptp(whole.position))))
-    return replace(part, before=way_to(whole.position, rows.start), run_in=min(far, int(RUN_IN * gone.size)))
+    return replace(part, before=way_to(whole, rows.start), run_in=min(far, int(RUN_IN * gone.size)))
 
 
-def way_to(position: Floats, to: int) -> Floats:
-    """Return the positions on the way to a row, not more than needed."""
-    return position[: to + 1][:: -max(1, position.size // BEFORE)][::-1]
+def way_to(segment: Segment, to: int) -> Floats:
+    """Return times and positions on the way to a row, (2, M), also those before the segment; some of all."""
+    rows = slice(to, None, -max(1, segment.position.size // BEFORE))
+    way = np.stack([segment.time[rows], segment.position[rows]])[:, ::-1]
+    return way if segment.before is None else np.concatenate([segment.before[:, :-1], way], axis=1)
 
 
 def averaged(segment: Segment, factor: int) -> Segment:
@@ -175,11 +178,10 @@ def _windows(segment: Segment, count: int, rows: int) -> list[Segment]:
         return [segment]
     starts = np.linspace(0, segment.time.size - rows, count).astype(np.int64)
     starts = with_rows(starts, _telling(segment), rows, segment.time.size)
-    earlier = np.zeros(0) if segment.before is None else segment.before
     return [
         replace(
             segment.part(slice(k, k + rows)),
-            before=np.concatenate([earlier, way_to(segment.position, k)]),
+            before=way_to(segment, k),
             run_in=int(RUN_IN * rows) if k else segment.run_in,
         )
         for k in starts.tolist()

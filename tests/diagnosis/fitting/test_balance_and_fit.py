@@ -23,6 +23,7 @@ from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.stage_of import stage_of
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.forces.blocks import reserved_blocks
+from rtcomp.diagnosis.forces.led import led_there
 from rtcomp.diagnosis.forces.replicate import left_by, replicate
 from rtcomp.diagnosis.mismatch.where import as_force, as_seen, noise_seen
 from rtcomp.diagnosis.numerics.regression import Grams
@@ -30,7 +31,7 @@ from rtcomp.diagnosis.positions.windows import Windows
 from rtcomp.diagnosis.recordings.data import MOST_ROWS, load_data
 from rtcomp.diagnosis.verdict.validation import Reserved
 from rtcomp.errors import ConfigError, RecordingError
-from rtcomp.physics import Effect, catalogue
+from rtcomp.physics import Effect, build, catalogue
 from rtcomp.stage.balance import between_rows
 from rtcomp.stage.stage import Stage
 from rtcomp.trial.motion import draw_reference
@@ -171,6 +172,23 @@ def test_friction_remembers_the_way_to_a_window() -> None:
         assert units[10:-10, stops] == pytest.approx(
             along[first + 10 : first + window.time.size - 10, stops], abs=0.02 * float(balance.reaches[-1])
         )
+
+
+def test_what_swings_remembers_the_way_to_a_window() -> None:
+    """A mass that swings for seconds: in a window it swings as it does in the whole recording."""
+    swings = build({"name": "resonance", "mass_ratio": 0.4, "frequency": 7.0, "damping": 0.01})
+    believed, whole = stage(), run(stage(), there_and_back(72.0))
+    balance = ForceBalance(believed, load_data([whole]))
+    (everything,) = load_data([cut(whole, 0, MOST_ROWS)]).segments
+    path = balance._path(everything, [])
+    _, along = led_there(believed, [swings], everything, path)
+    inside = [w for w in balance.data.segments[1:] if w.time[-1] < everything.time[-1]]
+    assert inside
+    for window in inside:
+        rows = slice(round(float(window.time[0]) * 1000.0), round(float(window.time[-1]) * 1000.0) + 1)
+        mass, push = led_there(believed, [swings], window, path.part(rows))
+        np.testing.assert_allclose(push, along[rows], atol=0.03 * float(np.abs(along).max()))
+        np.testing.assert_allclose(mass, 0.6 * believed.mass)
 
 
 @given(st.lists(st.floats(-3.0, 3.0), min_size=4, max_size=4), st.floats(0.0, 1.0))

@@ -1,0 +1,30 @@
+"""Masses and springs led along the way to a segment: what swings has a state where the segment begins."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rtcomp.diagnosis.forces.kinematics import Path
+from rtcomp.diagnosis.recordings.data import Segment
+from rtcomp.kernels import Floats
+from rtcomp.physics import Effect
+from rtcomp.stage.balance import forces
+from rtcomp.stage.stage import Stage
+
+
+def led_there(stage: Stage, chain: list[Effect], segment: Segment, path: Path) -> tuple[Floats, Floats]:
+    """Return the moving mass (kg) and the push (N), each (K,), of effects along a segment.
+
+    They are led along the way to it first, where there is one: its rows are far apart, but what swings is
+    exact for any length of a step.
+    """
+    way = segment.before
+    motion = np.stack([segment.time, path.x, path.v, path.a, segment.voltage])
+    first = 0
+    if way is not None and way.shape[1] > 1:
+        time, x = way
+        v = np.gradient(x, time)
+        led = np.stack([time, x, v, np.gradient(v, time), np.zeros(time.size)])[:, :-1]  # it ends at this row
+        first, motion = led.shape[1], np.concatenate([led, motion], axis=1)
+    f = forces(stage, chain, *motion)
+    return f.mass[first:], f.push[first:]
