@@ -20,11 +20,15 @@ from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.settings import LEAST_GAIN
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
+from rtcomp.physics import Parameter
 
 FASTER = 1.8
 """Ratio of frequencies that are looked through."""
 STIFFER = range(-1, 5)
 """Powers of it by which a load swings faster against the ends of its play than the axis on its friction."""
+PARTS = 5
+"""Values of what has no unit, as the share of the mass behind a play: one that is a tenth off fits worse than
+no play at all."""
 BEST, TRIES, FIRST = 2, 50, 0.3
 """Points from which the least is looked for, how often each, and its first steps (logarithm)."""
 IMPOSSIBLE = 1e300
@@ -36,7 +40,7 @@ NEAR = 5
 def scanned(fitter: Fitter, model: Fitted, term: Term, ends: float) -> list[Term]:
     """Return the term with all its numbers where a model with it fits best, and with its length alone.
 
-    How a load meets the ends of its play decides which length fits: lengths and frequencies are looked
+    How heavy a load is and how it meets the ends of its play decides which length fits: all are looked
     through together, on a part of the balance. From the best the least is looked for by simplex (Nelder and
     Mead 1965, Computer Journal 7(4)): what leaves when the load is met a little earlier has no useful slope.
     None where the model fits best without, or nothing moves.
@@ -52,7 +56,7 @@ def scanned(fitter: Fitter, model: Fitted, term: Term, ends: float) -> list[Term
     left, from_afar = (_left(one, model, term, ends) for one in (some, few))
     without = some.quick(model.terms)
     swings = math.sqrt(max(float(model.weights.sum()), 0.0) / fitter.balance.stage.mass) / (2.0 * math.pi)
-    grids = [[swings * FASTER**k for k in STIFFER] if p.unit == "Hz" else [p.default] for p in stated]
+    grids = [[swings * FASTER**k for k in STIFFER] if p.unit == "Hz" else _within(p) for p in stated]
     points = list(itertools.product(*grids, _lengths(fitter)))
     tried = shared(lambda point: from_afar({**defaults, **dict(zip(names, point, strict=True))}), points)
     if not min(tried) < (1.0 - LEAST_GAIN) ** 2 * few.quick(model.terms):
@@ -87,6 +91,11 @@ def _least(
     simplex = np.vstack([at, at + FIRST * np.eye(at.size)])
     done = minimize(left_at, at, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": TRIES})
     return float(done.fun), dict(zip(names, np.exp(done.x).tolist(), strict=True))
+
+
+def _within(p: Parameter) -> list[float]:
+    """Return values within a parameter's range, evenly apart."""
+    return [float(each) for each in np.linspace(p.low, p.high, PARTS + 2)[1:-1]]
 
 
 def _lengths(fitter: Fitter) -> list[float]:

@@ -85,8 +85,12 @@ def _bent(balance: ForceBalance, entry: Entry, force: Floats) -> Floats:
 def of_position(balance: ForceBalance, entry: Entry) -> Floats:
     """Return the whitened columns (q, n) of any other function of position, where an entry's force is one.
 
-    As large as what varies of the force; none where that is no smooth function of position.
+    As large as what varies of the force; none where that is no smooth function of position. All are nothing
+    where the force is least, and none has a part like it: a spring by any law has its zero, and a constant
+    beside it is none.
     """
+    from scipy.linalg import null_space
+
     none = np.zeros((0, balance.block.size))
     if not ent.adds_force(ent.kind_of(entry)):
         return none
@@ -94,10 +98,12 @@ def of_position(balance: ForceBalance, entry: Entry) -> Floats:
     force = balance.plain([balance.force_of(effect, segment, path) for segment, path in pairs])
     position = balance.plain([p.x for p in balance.paths()])
     size, splines = _size(force), _natural_splines(position)
-    rest = force - (force @ splines.T) @ splines / position.size
-    if not _size(rest) < SMOOTH * size:
+    parts = splines @ force / position.size
+    if not _size(force - parts @ splines) < SMOOTH * size:
         return none
-    return np.array([as_white(balance, size * each) for each in splines[1:]])
+    zero = int(np.argmin(np.abs(force)))
+    others = null_space(parts[None, 1:]).T @ (splines[1:] - splines[1:, zero, None])
+    return np.array([as_white(balance, size * each) for each in others])
 
 
 def _size(force: Floats) -> float:

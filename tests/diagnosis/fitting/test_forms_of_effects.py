@@ -123,12 +123,13 @@ def test_friction_is_larger_by_as_much_as_an_effect_makes_it() -> None:
 def test_another_function_of_position_is_told_from_a_spring_where_it_repeats(
     waves: float, told: bool
 ) -> None:
-    """Within the stroke: else any form of spring may be it, as one that goes by x |x|."""
+    """Within the stroke: else any form of spring may be it, as one that goes by x |x|. A constant is none."""
     believed = stage(effects=[{"name": "parallel-spring", "stiffness": 2000.0}])
-    balance = ForceBalance(believed, load_data([run(believed, there_and_back(20.0))]))
+    balance = ForceBalance(believed, load_data([run(believed, there_and_back(20.0) + 1e-4)]))
     fitter, fitted = Fitter(balance), baseline(balance)
-    forms = fitter.other_forms(fitted, "cogging")
     position = balance.plain([p.x for p in balance.paths()])
+    own = as_white(balance, 2000.0 * position)
+    forms = np.concatenate([fitter.other_forms(fitted, "cogging"), own[None, :]])
     low, high = float(position.min()), float(position.max())
 
     def left(force: np.ndarray) -> float:
@@ -137,9 +138,9 @@ def test_another_function_of_position_is_told_from_a_spring_where_it_repeats(
             np.linalg.norm(white - np.linalg.lstsq(forms.T, white)[0] @ forms) / np.linalg.norm(white)
         )
 
-    middle = position - 0.5 * (low + high)
-    assert (left(np.sin(2.0 * np.pi * waves * middle / (high - low))) > 0.2) == told
-    assert left(middle * np.abs(middle)) < 0.03
+    assert (left(np.sin(2.0 * np.pi * waves * position / (high - low))) > 0.2) == told
+    assert left(position * np.abs(position)) < 0.03
+    assert left(np.ones(position.size)) > 0.3
     assert not fitter.other_forms(fitted, "parallel-spring").size
 
 
