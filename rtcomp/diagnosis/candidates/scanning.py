@@ -13,7 +13,6 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.candidates.excerpt import excerpt, with_few_units
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.entries import Entry
-from rtcomp.diagnosis.fitting.baseline import CLOSE
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
@@ -23,10 +22,10 @@ from rtcomp.kernels import Floats
 from rtcomp.physics import Parameter
 
 FASTER = 1.8
-"""Ratio of frequencies that are looked through."""
+"""Ratio of frequencies, and of lengths, that are looked through."""
 STIFFER = range(-1, 5)
 """Powers of it by which a load swings faster against the ends of its play than the axis on its friction."""
-PARTS = 5
+PARTS = 4
 """Values of what has no unit, as the share of the mass behind a play: one that is a tenth off fits worse than
 no play at all."""
 BEST, TRIES, FIRST = 2, 50, 0.3
@@ -102,7 +101,7 @@ def _lengths(fitter: Fitter) -> list[float]:
     """Return lengths (m) of a play, from two grains to a quarter of the stroke."""
     low, high = fitter.balance.data.stroke
     shortest, longest = 2.0 * fitter.balance.grain, 0.25 * (high - low)
-    count = 2 + int(math.log(max(longest / shortest, 1.0)) / math.log(CLOSE))
+    count = 2 + int(math.log(max(longest / shortest, 1.0)) / math.log(FASTER))
     return [float(each) for each in np.geomspace(shortest, longest, count)]
 
 
