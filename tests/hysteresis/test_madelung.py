@@ -31,7 +31,7 @@ def leant(path, s):
 def bent(path, s, asymmetry):
     out = np.zeros(path.size)
     for k in range(path.size):
-        out[k] = bend(s, path[k], asymmetry)
+        out[k] = bend(s, path[k], asymmetry, 0.0)
     return out
 
 
