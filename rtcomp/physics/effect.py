@@ -32,6 +32,7 @@ Friction::
     40  asymmetric-friction             MOVED larger forward than backward
     50  models, bouc-wen, speed laws    add to FRICTION; a model leaves GRIP, GRIP_LEVEL, GRIP_STIFFNESS
     70  asymmetric-friction, closing    bends GRIP and exchanges it in FRICTION
+        non-congruent-friction          the same (its form by branches)
     80  non-congruent-friction          bends GRIP and exchanges it in FRICTION (its first form)
    100  (end of backlash)               FRICTION and PUSH act on the load behind the play: BEHIND
 

@@ -15,8 +15,8 @@ from rtcomp.stage.stage import Stage
 def led_there(stage: Stage, chain: list[Effect], segment: Segment, path: Path) -> tuple[Floats, Floats]:
     """Return the moving mass (kg) and the push (N), each (K,), of effects along a segment.
 
-    They are led along the way to it first, where there is one: its rows are far apart, but what swings is
-    exact for any length of a step.
+    They are led along the way to it first, where there is one. Its rows are far apart; the catalogue's second
+    mass is exact for any length of a step.
     """
     way = segment.before
     motion = np.stack([segment.time, path.x, path.v, path.a, segment.voltage])
