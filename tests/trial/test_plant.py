@@ -52,6 +52,19 @@ def test_a_command_acts_from_its_row_to_the_next() -> None:
     assert bent * 1e6 == pytest.approx(given, abs=1e-6)
 
 
+@pytest.mark.parametrize("lag", [0.0, 0.03])
+@pytest.mark.parametrize(("viscous", "back_emf"), [(40.0, 0.0), (0.0, 40.0), (25.0, 15.0)])
+def test_damping_and_a_lag_are_those_of_their_equations(lag: float, viscous: float, back_emf: float) -> None:
+    """A voltage switched on, against the closed form: far closer than any sensor reads."""
+    damped = PHYSICS._replace(level=1e-12, viscous=viscous, back_emf=back_emf, micro_damping=0.0, lag=lag)
+    run = simulate(damped, LOOP._replace(noise=0.0, resolution=0.0, open=1.0), np.ones(400), 1)
+    t, time_constant, speed = run.time, 2.0 / 40.0, 4.0 / 40.0
+    late, slow = (each * (1.0 - np.exp(-t / each)) for each in (lag or 1.0, time_constant))
+    share = lag / (time_constant - lag)
+    expected = speed * (t - (1.0 + share) * slow + (share * late if lag else 0.0))
+    assert run.truth == pytest.approx(expected, abs=1e-6 * np.ptp(expected))
+
+
 def test_in_steady_sliding_the_drive_carries_coulomb_and_viscous_friction() -> None:
     loop = LOOP._replace(noise=0.0, resolution=0.0)
     slow = PHYSICS._replace(micro_damping=0.0)

@@ -107,7 +107,7 @@ class ForceBalance(Signals):
     def _needed(self, segment: Segment, c: Floats) -> Floats:
         """Return the force (N, (K,)) that a segment's motion needs, of coefficients `c` of the belief."""
         path = self._path(segment, [], smooth=False)
-        units = self._units(segment, path, [], [], None)
+        units = self._units(segment, path, self._start(segment, []), [], [], None)
         force = path.measured * c[0] + units @ c[1 : self.friction.stop]
         made = [ent.build(one) for e in self.believed for one in ent.basis(e)]
         for effect, size in zip(made, c[self.size :], strict=True):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rtcomp.diagnosis.forces.kinematics import Path
@@ -9,16 +11,30 @@ from rtcomp.diagnosis.recordings.data import Segment
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect
 from rtcomp.stage.balance import forces
+from rtcomp.stage.sensed import true_position
 from rtcomp.stage.stage import Stage
 
 
-def led_there(stage: Stage, chain: list[Effect], segment: Segment, path: Path) -> tuple[Floats, Floats]:
+def way_there(segment: Segment, sensors: Sequence[Effect]) -> Floats | None:
+    """Return times and positions on the way to a segment, (2, M), behind what `sensors` did to the reading.
+
+    None where a recording begins with it.
+    """
+    if segment.before is None or not sensors:
+        return segment.before
+    time, reading = segment.before
+    return np.stack([time, true_position(sensors, time, reading)])
+
+
+def led_there(
+    stage: Stage, chain: list[Effect], segment: Segment, path: Path, sensors: Sequence[Effect] = ()
+) -> tuple[Floats, Floats]:
     """Return the moving mass (kg) and the push (N), each (K,), of effects along a segment.
 
     They are led along the way to it first, where there is one. Its rows are far apart; the catalogue's second
     mass is exact for any length of a step.
     """
-    way = segment.before
+    way = way_there(segment, sensors)
     motion = np.stack([segment.time, path.x, path.v, path.a, segment.voltage])
     first = 0
     if way is not None and way.shape[1] > 1:

@@ -16,7 +16,7 @@ from rtcomp.diagnosis.cache import Cache, Group, key_of
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.forces.bank import AS_IT_IS, SPEED_UNITS, deflections, units_along
 from rtcomp.diagnosis.forces.kinematics import Path, second_difference
-from rtcomp.diagnosis.forces.led import led_there
+from rtcomp.diagnosis.forces.led import led_there, way_there
 from rtcomp.diagnosis.forces.noise import Noise
 from rtcomp.diagnosis.forces.play import Carried, Load, behind_play
 from rtcomp.diagnosis.forces.reaches import grid
@@ -198,7 +198,7 @@ class Signals:
                 a = p.measured
                 for some, path in ((second_masses, p), (on_load, load)):
                     if some:
-                        moving, push = led_there(self.stage, some, s, path)
+                        moving, push = led_there(self.stage, some, s, path, sensors)
                         a = (a * moving - around_rows(push)) / self.stage.mass
                 if carried is not None:
                     a = a + carried.play.values["share"] * (load.a - p.a)
@@ -212,7 +212,10 @@ class Signals:
             for s, path in zip(self.data.segments, driven(), strict=True):
                 pushed = replace(s, voltage=(1.0 + more) * s.voltage) if more else s
                 at_hand = weights if whole else None
-                found.append(self._units(pushed, path, before, modifiers, at_hand, some, times, larger))
+                start = self._start(s, sensors)
+                found.append(
+                    self._units(pushed, path, start, before, modifiers, at_hand, some, times, larger)
+                )
             return found
 
         def of_sizes(sizes: Floats) -> list[Floats]:
@@ -270,6 +273,7 @@ class Signals:
         self,
         segment: Segment,
         path: Path,
+        start: Floats,
         before: Sequence[Effect],
         modifiers: Sequence[Effect],
         weights: Floats | None,
@@ -279,14 +283,11 @@ class Signals:
     ) -> Floats:
         """Return the force (N, (K, p)) around the rows of damping and of friction units, all or `some`.
 
-        With so many `times` each, their sum instead of them.
+        `start` (m) are deflections of all units before the motion. With so many `times` each, their sum
+        instead of them.
         """
         motion = np.column_stack([segment.time, path.x, path.v, path.a, self.given(segment)])
-        held, reaches, start = (
-            self.weights if weights is None else weights,
-            self.reaches,
-            self._start(segment),
-        )
+        held, reaches = self.weights if weights is None else weights, self.reaches
         if some is not None:
             held, reaches, start = held[some], reaches[some], start[some]
             times = times[some] if times is not None else None
@@ -295,12 +296,13 @@ class Signals:
             self.grain, start, PARTS, times, larger,
         )  # fmt: skip
 
-    def _start(self, segment: Segment) -> Floats:
+    def _start(self, segment: Segment, sensors: Sequence[Effect]) -> Floats:
         """Return the deflections (m) of the friction units at the first row of a segment."""
-        if segment.before is None:
+        way = way_there(segment, sensors)
+        if way is None:
             return np.zeros(self.reaches.size)
-        way, key = segment.before[1], ("start", float(segment.time[0]), segment.time.size)
-        found: Floats = self._cache.of(key, lambda: [deflections(way, self.reaches)])[0]
+        key = ("start", float(segment.time[0]), segment.time.size, key_of(sensors))
+        found: Floats = self._cache.of(key, lambda: [deflections(way[1], self.reaches)])[0]
         return found
 
     def _added(self, entry: Entry, sensors: Sequence[Effect], carried: Carried | None) -> Group:

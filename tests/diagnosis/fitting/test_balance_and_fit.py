@@ -23,14 +23,16 @@ from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.stage_of import stage_of
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.forces.blocks import reserved_blocks
+from rtcomp.diagnosis.forces.kinematics import Path
 from rtcomp.diagnosis.forces.led import led_there
 from rtcomp.diagnosis.forces.replicate import left_by, replicate
 from rtcomp.diagnosis.mismatch.where import as_force, as_seen, noise_seen
 from rtcomp.diagnosis.numerics.regression import Grams
 from rtcomp.diagnosis.positions.windows import Windows
-from rtcomp.diagnosis.recordings.data import MOST_ROWS, load_data
+from rtcomp.diagnosis.recordings.data import MOST_ROWS, Segment, load_data
 from rtcomp.diagnosis.verdict.validation import Reserved
 from rtcomp.errors import ConfigError, RecordingError
+from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, build, catalogue
 from rtcomp.stage.balance import between_rows
 from rtcomp.stage.stage import Stage
@@ -155,21 +157,27 @@ def test_a_judgement_needs_motion_in_the_reserved_blocks() -> None:
         Reserved(balance(np.abs(t - 10.0) < 8.3))
 
 
-def test_friction_remembers_the_way_to_a_window() -> None:
+@pytest.mark.parametrize("drift", [0.0, 5e-3])
+def test_friction_remembers_the_way_to_a_window(drift: float) -> None:
+    """The way that the axis went: what the sensor did to the reading on the way is undone as well."""
     believed, whole = stage(), run(stage(), there_and_back(72.0))
     balance = ForceBalance(believed, load_data([whole]))
+    sensors = [build({"name": "sensor-drift", "drift": drift, "time_constant": 20.0})] if drift else []
     windows, (everything,) = balance.data.segments, load_data([cut(whole, 0, MOST_ROWS)]).segments
     assert len(windows) > 1 and everything.before is None
-    path = balance._path(everything, [])
-    along = balance._units(everything, path, [], [], None)
+
+    def units(segment: Segment, path: Path) -> Floats:
+        return balance._units(segment, path, balance._start(segment, sensors), [], [], None)
+
+    path = balance._path(everything, sensors)
+    along = units(everything, path)
     inside = [w for w in windows[1:] if w.time[-1] < everything.time[-1]]
     assert inside
     for window in inside:
         first = round(float(window.time[0]) * 1000.0)
         part = path.part(slice(first, first + window.time.size))
-        units = balance._units(window, part, [], [], None)
         stops = slice(2 + balance.reaches.size // 2, None)  # short ones forget the way at once
-        assert units[10:-10, stops] == pytest.approx(
+        assert units(window, part)[10:-10, stops] == pytest.approx(
             along[first + 10 : first + window.time.size - 10, stops], abs=0.02 * float(balance.reaches[-1])
         )
 
