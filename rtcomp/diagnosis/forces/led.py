@@ -18,9 +18,11 @@ from rtcomp.stage.stage import Stage
 def way_there(segment: Segment, sensors: Sequence[Effect]) -> Floats | None:
     """Return times and positions on the way to a segment, (2, M), behind what `sensors` did to the reading.
 
-    None where a recording begins with it.
+    None where a recording begins with it: nothing went before.
     """
-    if segment.before is None or not sensors:
+    if segment.before is None or segment.before.shape[1] < 2:
+        return None
+    if not sensors:
         return segment.before
     time, reading = segment.before
     return np.stack([time, true_position(sensors, time, reading)])
@@ -37,7 +39,7 @@ def led_there(
     way = way_there(segment, sensors)
     motion = np.stack([segment.time, path.x, path.v, path.a, segment.voltage])
     first = 0
-    if way is not None and way.shape[1] > 1:
+    if way is not None:
         time, x = way
         v = np.gradient(x, time)
         led = np.stack([time, x, v, np.gradient(v, time), np.zeros(time.size)])[:, :-1]  # it ends at this row

@@ -24,7 +24,7 @@ from rtcomp.diagnosis.fitting.stage_of import stage_of
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.forces.blocks import reserved_blocks
 from rtcomp.diagnosis.forces.kinematics import Path
-from rtcomp.diagnosis.forces.led import led_there
+from rtcomp.diagnosis.forces.led import led_there, way_there
 from rtcomp.diagnosis.forces.replicate import left_by, replicate
 from rtcomp.diagnosis.mismatch.where import as_force, as_seen, noise_seen
 from rtcomp.diagnosis.numerics.regression import Grams
@@ -165,6 +165,7 @@ def test_friction_remembers_the_way_to_a_window(drift: float) -> None:
     sensors = [build({"name": "sensor-drift", "drift": drift, "time_constant": 20.0})] if drift else []
     windows, (everything,) = balance.data.segments, load_data([cut(whole, 0, MOST_ROWS)]).segments
     assert len(windows) > 1 and everything.before is None
+    assert way_there(windows[0], [build({"name": "sensor-delay", "delay": 1e-3})]) is None
 
     def units(segment: Segment, path: Path) -> Floats:
         return balance._units(segment, path, balance._start(segment, sensors), [], [], None)
