@@ -7,6 +7,7 @@ inner one those that the outer leaves idle.
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -16,6 +17,9 @@ from typing import TypeVar
 from numba import config
 
 from rtcomp.interrupts import signals_wait
+
+FEW = 2e7
+"""Floating-point operations that take about as long as to hand work over and to wait for it: 1 ms or two."""
 
 Item = TypeVar("Item")
 Found = TypeVar("Found")
@@ -53,14 +57,21 @@ def _helpers() -> _Helpers:
 
 
 def shared(
-    function: Callable[[Item], Found], items: Iterable[Item], done: Callable[[float], None] | None = None
+    function: Callable[[Item], Found],
+    items: Iterable[Item],
+    done: Callable[[float], None] | None = None,
+    *,
+    operations: float = math.inf,
 ) -> list[Found]:
     """Return ``[function(i) for i in items]``, worked out on all cores that are idle.
 
+    Of few floating-point `operations` in all no part is handed over: that would take longer than to do it.
     `function` must be pure, or change nothing but what it remembers. `done` hears the part that is done,
     always in the calling thread. The first exception is raised, by the order of the items.
     """
     all_items = list(items)
+    if operations < FEW and done is None:
+        return [function(item) for item in all_items]
     found: dict[int, Found] = {}
     failed: dict[int, BaseException] = {}
     left = iter(enumerate(all_items))

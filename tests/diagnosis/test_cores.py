@@ -26,6 +26,11 @@ def test_results_come_in_the_order_of_the_items(items: list[int]) -> None:
     assert shared(lambda i: i * i, items) == [i * i for i in items]
 
 
+def test_few_operations_are_done_by_the_caller_alone() -> None:
+    threads = shared(lambda _: threading.get_ident(), range(50), operations=1e3)
+    assert set(threads) == {threading.get_ident()}
+
+
 def test_none_is_an_item_like_others() -> None:
     assert shared(lambda i: i, [None, 1, None]) == [None, 1, None]
 

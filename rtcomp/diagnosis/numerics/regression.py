@@ -61,7 +61,9 @@ class Grams:
             part, target = columns[:, slice(*ends)], y[slice(*ends)]
             return part @ part.T, part @ target, float(target @ target)
 
-        gram, cross, power = zip(*shared(products, pairwise(edges.tolist())), strict=True)
+        work = 2.0 * columns.shape[0] * columns.size
+        made = shared(products, pairwise(edges.tolist()), operations=work)
+        gram, cross, power = zip(*made, strict=True)
         return cls(np.array(gram), np.array(cross), np.array(power), np.diff(edges).astype(np.float64))
 
     def solve(self, use: np.ndarray, prior: Prior, variance: float) -> Floats:

@@ -18,6 +18,8 @@ BANDS = 60
 """Bands, equally wide in the logarithm of frequency, over which spectra are smoothed."""
 AT_A_TIME = 4
 """Signals that are transformed together: more do not stay in the processor's cache."""
+OF_A_POINT = 100.0
+"""Floating-point operations of a filter for each point: two transforms, and what is laid out and put back."""
 ALL = slice(None)
 
 Complexes = npt.NDArray[np.complex128]
@@ -63,7 +65,8 @@ def filtered(
         found = scipy.fft.irfft(folded, n=few, axis=1, overwrite_x=True)
         _put_back(found, lines, at_rest, rate, derivative, at, out[row : row + AT_A_TIME])
 
-    shared(fill, range(0, table.shape[0], AT_A_TIME))
+    work = OF_A_POINT * table.shape[0] * few * every
+    shared(fill, range(0, table.shape[0], AT_A_TIME), operations=work)
     return out if rows.ndim > 1 else out[0]
 
 
