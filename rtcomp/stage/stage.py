@@ -41,7 +41,9 @@ class Stage:
 
     def __init__(self, file: StageFile) -> None:
         self.file = file
-        chain = _chain(file)
+        self.friction = _friction(file.stage)
+        """The friction model, where there is one."""
+        chain = _chain(file, self.friction)
         chain += [companion for effect in chain for companion in effect.companions()]
         self.chain: list[Effect] = sorted(chain, key=lambda e: (e.place, e.order))
 
@@ -108,11 +110,6 @@ class Stage:
         """Largest command that has an effect (V)."""
         return self.file.stage.voltage_limit
 
-    @property
-    def friction(self) -> Effect | None:
-        """The friction model, where there is one."""
-        return _friction(self.file.stage)
-
     def with_changes(self, **sections: Mapping[str, Any]) -> Stage:
         """Return a stage with keys of its sections replaced: ``stage.with_changes(stage={"mass": 2.1})``."""
         data = self.to_dict()
@@ -131,7 +128,7 @@ def _friction(mechanics: Mechanics) -> Effect | None:
     return friction_model(friction)
 
 
-def _chain(file: StageFile) -> list[Effect]:
+def _chain(file: StageFile, friction: Effect | None) -> list[Effect]:
     """Write the scalar keys of the stage as the effects they stand for, and add the others."""
     m = file.stage
     chain: list[Effect] = [
@@ -143,7 +140,6 @@ def _chain(file: StageFile) -> list[Effect]:
     if m.micro_damping:
         damping = {"coefficient": m.micro_damping, "speed": m.micro_damping_speed}
         chain.append(physics.build({"name": "micro-damping", **damping}))
-    friction = _friction(m)
     if friction is not None:
         chain.append(friction)
     chain += [physics.build(effect) for effect in m.effects]

@@ -264,9 +264,10 @@ class Signals:
     def weights(self) -> Floats:
         """Believed friction as stiffnesses (N/m) of the units."""
         found = np.zeros(self.reaches.size)
-        for k, r in self._elements:
-            at = int(np.argmin(np.abs(np.log(self.reaches / r))))
-            found[at] += k * r / self.reaches[at]
+        if self._elements:
+            k, r = np.array(self._elements).T
+            at = np.argmin(np.abs(np.log(self.reaches[:, None] / r)), axis=0)
+            np.add.at(found, at, k * r / self.reaches[at])
         return found
 
     def _units(
