@@ -9,13 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rtcomp.diagnosis import clock
-from rtcomp.diagnosis.candidates.growing import in_better_form
 from rtcomp.diagnosis.candidates.screening import Look, look
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting.baseline import baseline, settle, with_offset
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
-from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.forces.noise import Noise
 from rtcomp.diagnosis.forces.sticking import untold
@@ -27,7 +25,8 @@ from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.result import Diagnosis, Place
 from rtcomp.diagnosis.search.confidence import alternatives
 from rtcomp.diagnosis.search.selection import LOOKED, Search, search, until
-from rtcomp.diagnosis.settings import BUDGET, LEAST_GAIN, LEFT
+from rtcomp.diagnosis.search.ways import Left, alike, least_left, outdone
+from rtcomp.diagnosis.settings import BUDGET, LEFT
 from rtcomp.diagnosis.verdict.answer import Rest, answer
 from rtcomp.diagnosis.verdict.validation import Reserved
 from rtcomp.errors import RtcompError
@@ -172,36 +171,10 @@ def _objectives(
     shares = (0.5 * LOOKED, LOOKED / (2.0 - LOOKED))  # of what is left each time: as long for both
     pairs = zip(made, shares, strict=True)
     looked = [replace(one, first=look(one.fitter, one.base, until(ends, share))) for one, share in pairs]
-    return sorted(looked, key=_left_beside)
-
-
-def _left_beside(one: Objective) -> float:
-    """Return the logarithm of what the best candidate leaves, to first order."""
-    return _left(one.balance, one.base) - (one.first.gain if one.first is not None else 0.0)
-
-
-def _left(balance: ForceBalance, model: Fitted) -> float:
-    """Return the logarithm of what a model leaves of the drive's force."""
-    return float(np.mean(np.log(model.errors / balance.power)))
-
-
-def least_left(fitter: Fitter, terms: Sequence[Term], ends: float) -> float:
-    """Return the logarithm of what effects leave, the last of them in the form that suits this objective."""
-    settle(fitter, terms, ends)
-    same = fitter.fit(terms)
-    forms = in_better_form(fitter, [same], ends) if terms else []
-    models = [same, *(fitter.fit([*terms[:-1], form], same) for form in forms)]
-    return min(_left(fitter.balance, model) for model in models)
-
-
-def outdone(first: float, own: float, same: float, fewer: float) -> bool:
-    """Tell whether a model does worse than the other way to take the command, by logarithms of what is left.
-
-    It leaves `own` of what there was at `first`; the other way `same` with its effects, `fewer` without the
-    last. Where this one does not matter against the other way without it, it only makes up for the way.
-    """
-    rms = [math.exp(0.5 * left) for left in (first, own, fewer)]
-    return same < own or rms[2] - rms[1] <= LEAST_GAIN * rms[0]
+    blocks = alike(*(one.balance for one in looked))
+    left = [Left.by(one.fitter, one.base, some).weighed for one, some in zip(looked, blocks, strict=True)]
+    beside = [each - one.first.gain for each, one in zip(left, looked, strict=True) if one.first is not None]
+    return [looked[i] for i in np.argsort(beside)]
 
 
 def _searched(
@@ -215,22 +188,26 @@ def _searched(
     without it.
     """
     best = objectives[0]
+    if len(objectives) == 1:
+        return best.fitter, search(best.fitter, best.base, ends, say, seed)
+    blocks = alike(*(one.balance for one in objectives))
 
     def doubted(model: Fitted) -> bool:
+        own, first = (Left.by(best.fitter, one, blocks[0]) for one in (model, best.base))
         other = Fitter(objectives[1].balance)
-        own, first = _left(best.balance, model), _left(best.balance, best.base)
-        same, fewer = (least_left(other, terms, ends) for terms in (model.terms, model.terms[:-1]))
+        other.offset = best.fitter.offset
+        same, fewer = (least_left(other, some, blocks[1], ends) for some in (model.terms, model.terms[:-1]))
         return outdone(first, own, same, fewer)
 
-    doubt = doubted if len(objectives) > 1 else None
-    found = search(best.fitter, best.base, ends, say, seed, doubt, best.first)
+    found = search(best.fitter, best.base, ends, say, seed, doubted, best.first)
     told = not Rest.of(best.fitter, found).significant
-    if doubt is None or (not found.doubted and (told or clock.now() > ends)):
+    if not found.doubted and (told or clock.now() > ends):
         return best.fitter, found
     fitter = Fitter(objectives[1].balance)
     settle(fitter)
     other = search(fitter, with_offset(fitter, fitter.fit([])), ends, say, seed)
     if found.doubted or not Rest.of(fitter, other).significant:
         return fitter, other
-    left = [_left(one.balance, by.chosen) for one, by in ((best.fitter, found), (fitter, other))]
-    return (fitter, other) if left[1] < left[0] + math.log(LEFT) else (best.fitter, found)
+    both = zip((best.fitter, fitter), (found, other), blocks, strict=True)
+    left, left_there = (Left.by(one, by.chosen, some).weighed for one, by, some in both)
+    return (fitter, other) if left_there < left + math.log(LEFT) else (best.fitter, found)

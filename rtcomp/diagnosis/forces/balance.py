@@ -102,7 +102,11 @@ class ForceBalance(Signals):
     @property
     def power(self) -> float:
         """Squared drive side of the blocks that are not reserved, as the belief has it."""
-        return self._power(self._plain_drive())
+        return self.power_of(~self.reserved)
+
+    def power_of(self, blocks: np.ndarray) -> float:
+        """Return the squared drive side of some `blocks`, (B,) bool, as the belief has it."""
+        return float(np.sum(self._plain_drive()[blocks[self.block]] ** 2))
 
     def _needed(self, segment: Segment, c: Floats) -> Floats:
         """Return the force (N, (K,)) that a segment's motion needs, of coefficients `c` of the belief."""
@@ -250,9 +254,6 @@ class ForceBalance(Signals):
     def _plain_drive(self) -> Floats:
         drive, sensors = ([e for e in self._fixed if e.place is p] for p in (Place.DRIVE, Place.SENSOR))
         return np.asarray(self._whitened(self._side(drive, sensors))[0])
-
-    def _power(self, y: Floats) -> float:
-        return float(np.sum(y[~self.reserved[self.block]] ** 2))
 
     def _swing(self, y: Floats) -> float:
         """Return the power of what a constant does not change."""
