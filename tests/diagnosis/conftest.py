@@ -1,1 +1,1 @@
-"""Puts this folder on the path, so that the tests of every room find `recorded`."""
+"""Puts this folder on the path, so that the tests of every room find `recorded` and `pendulum`."""

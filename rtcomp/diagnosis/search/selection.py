@@ -166,12 +166,13 @@ def _in_other_forms(fitter: Fitter, found: Search, grown: Sequence[Fitted], ends
 
     The form that suits them alone may be bent to do without the last.
     """
-    if not grown:
-        return []
     names = ent.names(found.chosen.entries)
+    larger = [g for g in grown if ent.names(g.entries)[:-1] == names]
+    if not larger:
+        return []
     alike = [m for m in found.alternatives if ent.names(m.entries) == names and not m.at_bound]
     near = [m for m in alike if score(m) < score(found.chosen) + NEAR]
-    last = min(grown, key=score).terms[-1:]
+    last = min(larger, key=score).terms[-1:]
     return [model for other in near for model in fitted_in_time(fitter, other, last, ends)]
 
 

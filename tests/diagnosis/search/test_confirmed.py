@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pendulum import LOAD, balanced, both
+from pendulum import stage as pendulum
 from recorded import run, stage, there_and_back
-from test_trajectory import LOAD, balanced, both
-from test_trajectory import stage as pendulum
 
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.free import Term

@@ -46,7 +46,7 @@ def test_an_effect_must_matter_against_the_other_way_without_it(own: float, same
 
 
 def test_a_part_of_the_force_that_does_not_matter_makes_no_delay() -> None:
-    """As one way leaves more of a residual whose frequencies it weighs otherwise, and as much of the force."""
+    """One way weighs frequencies otherwise and leaves more of its residual, but as much of the force."""
     first, own = Left(-10.8, -8.0), Left(-16.1, -10.3)
     assert outdone(first, own, Left(-15.38, -10.2), Left(-15.38, -10.29))
     assert not outdone(first, own, Left(-15.38, -10.2), Left(-12.0, -8.5))
