@@ -13,7 +13,7 @@ from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.search.selection import Search, _in_other_forms
 
-SINE = {"name": "cogging", "form": "sine", "amplitude": 0.3, "period": 1e-4, "phase": 0.4}
+SINE = {"name": "cogging", "form": "sine", "amplitude": 0.1, "period": 1e-4, "phase": 0.4}
 TRIANGLE = {**SINE, "form": "triangle"}
 STRIBECK = {"name": "stribeck", "rise": 0.2, "velocity": 1e-3}
 
