@@ -53,3 +53,9 @@ def now() -> float:
 def ends_at(budget: float, began: float | None = None) -> float:
     """Return when a budget (s) ends on this clock: counted from `began` (time.monotonic), or from now."""
     return now() + budget - (0.0 if began is None else time.monotonic() - began)
+
+
+def until(ends: float, share: float) -> float:
+    """Return the time at which a `share` of that which is left up to `ends` has passed."""
+    moment = now()
+    return moment + share * max(ends - moment, 0.0)

@@ -24,7 +24,7 @@ from rtcomp.diagnosis.positions.trajectory import Trajectory
 from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.result import Diagnosis, Place
 from rtcomp.diagnosis.search.confidence import alternatives
-from rtcomp.diagnosis.search.selection import LOOKED, Search, search, until
+from rtcomp.diagnosis.search.selection import LOOKED, Search, search
 from rtcomp.diagnosis.search.ways import Left, alike, least_left, outdone
 from rtcomp.diagnosis.settings import BUDGET, LEFT
 from rtcomp.diagnosis.verdict.answer import Rest, answer
@@ -101,7 +101,7 @@ def _diagnosed(
     say(1.0, "balance")
     finish = ends - (1.0 - SEARCH) * budget
     hidden = untold(balance) > MUCH
-    fitter, found = _searched(objectives, until(finish, FORCES) if hidden else finish, say, seed)
+    fitter, found = _searched(objectives, clock.until(finish, FORCES) if hidden else finish, say, seed)
     doubtful = hidden and (found.denied or Rest.of(fitter, found).significant)
     if doubtful and hides(fitter, found.chosen):
         if clock.now() < finish:
@@ -170,7 +170,9 @@ def _objectives(
         return made
     shares = (0.5 * LOOKED, LOOKED / (2.0 - LOOKED))  # of what is left each time: as long for both
     pairs = zip(made, shares, strict=True)
-    looked = [replace(one, first=look(one.fitter, one.base, until(ends, share))) for one, share in pairs]
+    looked = [
+        replace(one, first=look(one.fitter, one.base, clock.until(ends, share))) for one, share in pairs
+    ]
     blocks = alike(*(one.balance for one in looked))
     left = [Left.by(one.fitter, one.base, some).weighed for one, some in zip(looked, blocks, strict=True)]
     beside = [each - one.first.gain for each, one in zip(left, looked, strict=True) if one.first is not None]

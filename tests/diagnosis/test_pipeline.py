@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from recorded import RATE, run, stage, there_and_back
 
-from rtcomp.diagnosis.pipeline import diagnose, outdone
+from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.result import Diagnosis
 from rtcomp.errors import RtcompError
 from rtcomp.kernels import Floats, effect_kernel
@@ -210,16 +210,6 @@ def test_a_held_command_in_open_loop_is_no_delay() -> None:
     assert names(found) == [("resonance",)]
     assert found.effects[0].parameters["frequency"].value == pytest.approx(50.0, rel=0.03)
     assert not any("band-limited" in note for note in found.notes)
-
-
-@pytest.mark.parametrize(("own", "same", "fewer", "other"), [
-    (-6.0, -6.1, -3.0, True),  # the effect does more the other way
-    (-6.0, -5.9, -3.0, False),  # it is missing either way
-    (-6.0, -5.9, -5.98, True),  # it makes up for the way: without it the other leaves hardly more
-    (-6.0, -5.9, -6.2, True),
-])  # fmt: skip
-def test_the_way_a_command_goes_is_doubted(own: float, same: float, fewer: float, other: bool) -> None:
-    assert outdone(-2.0, own, same, fewer) == other
 
 
 def test_a_budget_that_does_not_do_for_the_baseline_is_refused() -> None:

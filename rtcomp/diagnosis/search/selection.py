@@ -40,6 +40,8 @@ class Search:
     """Of the chosen model, as it was when its replicates were made."""
     replicated: Fitted | None = None
     """That model."""
+    nulls: dict[tuple[str, ...], Null] = field(default_factory=dict)
+    """Null distributions of the models of all steps, by the names of their effects in order."""
     beside: list[Candidate] | None = None
     """All candidates beside the chosen model, where they were looked at."""
     alternatives: list[Fitted] = field(default_factory=list)
@@ -94,6 +96,7 @@ def search(
         before = replace(found)
         found.chosen = found.replicated = beam[0]
         found.null, found.beside = null, judged.candidates or None
+        found.nulls[_effects_of(beam[0])] = null
         found.elsewhere, found.cut = False, judged.cut
         found.alternatives = [g for g in grown if len(g.terms) == len(beam[0].terms) and g is not beam[0]]
         _skipped(found, judged.cut)
@@ -235,6 +238,12 @@ def _solid(fitter: Fitter, found: Search) -> None:
         found.dropped.append(f"{ent.names(found.chosen.entries)[at]} is not named: {doubted[at].why}")
         kept = [t for i, t in enumerate(found.chosen.terms) if i != at]
         found.chosen, found.alternatives, found.beside = fitter.fit(kept, found.chosen), [], None
+        # What is left is judged by replicates of the model that leaves it.
+        found.null = found.nulls.get(_effects_of(found.chosen), found.null)
+
+
+def _effects_of(model: Fitted) -> tuple[str, ...]:
+    return tuple(sorted(ent.names(model.entries)))
 
 
 def _settled_on_chosen(fitter: Fitter, found: Search) -> None:
@@ -276,12 +285,6 @@ def _refitted(fitter: Fitter, models: Sequence[Fitted]) -> list[Fitted]:
     return shared(lambda m: fitter.fit(m.terms, m), models)
 
 
-def until(ends: float, share: float) -> float:
-    """Return the time at which a `share` of that which is left up to `ends` has passed (clock.now)."""
-    now = clock.now()
-    return now + share * max(ends - now, 0.0)
-
-
 def _judged(
     fitter: Fitter,
     model: Fitted,
@@ -304,7 +307,7 @@ def _judged(
     say(0.0, what)
     if late:
         first = Look([], [], Screen([], fitter), None)
-    looked = until(ends, LOOKED)
+    looked = clock.until(ends, LOOKED)
     seen = first or look(fitter, model, looked, known)
     say(0.5, what)
     if not model.terms and exhausted(fitter, model, float(model.errors.sum())):

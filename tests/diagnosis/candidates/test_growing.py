@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -16,9 +15,9 @@ from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.starting import FULL, STARTS, as_they_are
 from rtcomp.diagnosis.forces.balance import ForceBalance
-from rtcomp.diagnosis.pipeline import least_left
 from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.search.selection import look
+from rtcomp.diagnosis.search.ways import Left, least_left
 
 STRIBECK = {"name": "stribeck", "rise": 0.4, "velocity": 1.5e-3}
 
@@ -39,8 +38,9 @@ def test_an_effect_is_grown_in_the_form_that_it_has(following: float) -> None:
     assert best["time_constant"] == pytest.approx(late["time_constant"], rel=0.1)
     # Where another way to take the command had it in the other form, this one still finds its own.
     other = Term.of({**best, "following": 1.0 - following})
-    own = float(np.mean(np.log(min(grown, key=lambda model: model.sse).errors / balance.power)))
-    assert least_left(fitter, [other], math.inf) == pytest.approx(own, abs=0.3)
+    blocks = ~balance.reserved
+    own = Left.by(fitter, min(grown, key=lambda model: model.sse), blocks)
+    assert least_left(fitter, [other], blocks, math.inf).weighed == pytest.approx(own.weighed, abs=0.3)
 
 
 @given(st.lists(st.lists(st.floats(1e-3, 9.0), min_size=1, max_size=4), max_size=6))
