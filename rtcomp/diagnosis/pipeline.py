@@ -170,13 +170,10 @@ def _objectives(
         return made
     shares = (0.5 * LOOKED, LOOKED / (2.0 - LOOKED))  # of what is left each time: as long for both
     pairs = zip(made, shares, strict=True)
-    looked = [
-        replace(one, first=look(one.fitter, one.base, clock.until(ends, share))) for one, share in pairs
-    ]
-    blocks = alike(*(one.balance for one in looked))
-    left = [Left.by(one.fitter, one.base, some).weighed for one, some in zip(looked, blocks, strict=True)]
-    beside = [each - one.first.gain for each, one in zip(left, looked, strict=True) if one.first is not None]
-    return [looked[i] for i in np.argsort(beside)]
+    seen = [look(one.fitter, one.base, clock.until(ends, share)) for one, share in pairs]
+    sets = zip(made, seen, alike(*(one.balance for one in made)), strict=True)
+    left = [Left.by(one.fitter, one.base, some).weighed - first.gain for one, first, some in sets]
+    return [replace(made[i], first=seen[i]) for i in np.argsort(left)]
 
 
 def _searched(

@@ -144,7 +144,7 @@ def _run(
             xf, vf = (x2, v2) if p.gap > 0.0 else (x, v)
             lagged_speed += (vf - lagged_speed) * (step / (p.friction_lag + step))
             speed = lagged_speed if p.friction_lag > 0.0 else vf
-            level = p.level * scale(p, t, xf, abs(drive))
+            level = p.level * scale(p, t, xf, abs(drive - p.back_emf * v))
             g = slip_level(p, t, speed, rest)
             damped = film(p, xf, speed)
             # A film follows speed late; the contacts' own damping in presliding does not.

@@ -299,12 +299,13 @@ class Signals:
 
     def _start(self, segment: Segment, sensors: Sequence[Effect]) -> Floats:
         """Return the deflections (m) of the friction units at the first row of a segment."""
-        way = way_there(segment, sensors)
-        if way is None:
-            return np.zeros(self.reaches.size)
+
+        def made() -> list[Floats]:
+            way = way_there(segment, sensors)
+            return [np.zeros(self.reaches.size) if way is None else deflections(way[1], self.reaches)]
+
         key = ("start", float(segment.time[0]), segment.time.size, key_of(sensors))
-        found: Floats = self._cache.of(key, lambda: [deflections(way[1], self.reaches)])[0]
-        return found
+        return np.asarray(self._cache.of(key, made)[0])
 
     def _added(self, entry: Entry, sensors: Sequence[Effect], carried: Carried | None) -> Group:
         """Return the force that the motion needs for an entry that adds one: behind a play, on the load."""
