@@ -6,12 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from rtcomp import physics
 from rtcomp.stage.balance import (
     PARTS,
     around_rows,
     bandwidth,
+    between_rows,
     force_balance,
     forces,
     known_force,
@@ -209,3 +212,12 @@ def test_forces_around_rows_are_weighed_one_ten_one(order):
     assert np.array_equal(force, before) and np.array_equal(found[[0, -1]], force[[0, -1]])
     np.testing.assert_allclose(found[1:-1], (force[:-2] + 10.0 * force[1:-1] + force[2:]) / 12.0, rtol=1e-14)
     assert np.array_equal(around_rows(np.ascontiguousarray(force[:, 1])), found[:, 1])
+
+
+@given(st.lists(st.floats(-3.0, 3.0), min_size=4, max_size=4), st.floats(0.0, 1.0))
+@settings(max_examples=50, deadline=None)
+def test_between_rows_a_position_is_the_cubic_through_both(terms: list[float], share: float) -> None:
+    cubic = np.polynomial.Polynomial(terms)
+    time = np.arange(4) * 0.5
+    motion = np.column_stack([time, cubic(time), cubic.deriv()(time), np.zeros(4), np.zeros(4)])
+    assert between_rows(motion, 2, share) == pytest.approx(float(cubic(1.0 - 0.5 * share)), abs=1e-9)

@@ -1,4 +1,4 @@
-"""Masses and springs led along the way to a segment: what swings has a state where the segment begins."""
+"""The way to a segment, and what is led along it: what swings has a state where the segment begins."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parts of the diagnosis: properties and known truths of filters, tests, entries and regression."""
+"""The balance and its fits: properties and known truths of entries, regression and noise."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recorded import RATE, STAGE, changed, cut, run, stage, there_and_back
+from recorded import RATE, STAGE, run, stage, there_and_back
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.candidates.effects import started
@@ -22,19 +22,11 @@ from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.stage_of import stage_of
 from rtcomp.diagnosis.forces.balance import ForceBalance
-from rtcomp.diagnosis.forces.blocks import reserved_blocks
-from rtcomp.diagnosis.forces.kinematics import Path
-from rtcomp.diagnosis.forces.led import led_there, way_there
-from rtcomp.diagnosis.forces.replicate import left_by, replicate
-from rtcomp.diagnosis.mismatch.where import as_force, as_seen, noise_seen
+from rtcomp.diagnosis.mismatch.where import as_force
 from rtcomp.diagnosis.numerics.regression import Grams
-from rtcomp.diagnosis.positions.windows import Windows
-from rtcomp.diagnosis.recordings.data import MOST_ROWS, Segment, load_data
-from rtcomp.diagnosis.verdict.validation import Reserved
-from rtcomp.errors import ConfigError, RecordingError
-from rtcomp.kernels import Floats
-from rtcomp.physics import Effect, build, catalogue
-from rtcomp.stage.balance import between_rows
+from rtcomp.diagnosis.recordings.data import MOST_ROWS, load_data
+from rtcomp.errors import ConfigError
+from rtcomp.physics import Effect, catalogue
 from rtcomp.stage.stage import Stage
 from rtcomp.trial.motion import draw_reference
 
@@ -44,20 +36,6 @@ FORMS = [
     if kind.searchable and ent.adds_force(kind) and kind.linear
     for form in (list(kind.forms) or [""])
 ]
-
-
-@given(st.integers(10, 25), st.sets(st.integers(0, 24)), st.sets(st.integers(0, 24)))
-def test_one_block_of_five_is_reserved_but_none_that_is_unlike_the_others(
-    count: int, stepped: set[int], furthest: set[int]
-) -> None:
-    found = reserved_blocks(count, stepped, furthest)
-    assert found.any()
-    unlike = stepped | furthest
-    if set(range(count - count % 5)) - unlike:
-        assert not unlike & set(np.flatnonzero(found).tolist())
-        for first in range(0, count - 2, 5):
-            group = set(range(first, min(first + 5, count)))
-            assert found[sorted(group)].sum() == bool(group - unlike)
 
 
 @pytest.mark.parametrize(("kind", "form"), FORMS, ids=[f"{k.name} {f}".strip() for k, f in FORMS])
@@ -96,33 +74,6 @@ def test_a_drive_that_gives_nothing_is_no_model() -> None:
         fitter.fit([Term.of({"name": "drive-deadband", "width": 9.0})], base)
 
 
-def test_reserved_blocks_judge_once() -> None:
-    believed = stage()
-    balance = ForceBalance(believed, load_data([run(believed, there_and_back())]))
-    baseline(balance)
-    reserved = Reserved(balance)
-    errors = reserved.judge({"before": believed})
-    assert errors["before"] < 3.0 * errors["noise"] + 0.01
-    with pytest.raises(RuntimeError, match="judged already"):
-        reserved.judge({"before": believed})
-
-
-def test_a_judgement_counts_forces_that_stand_above_the_sensors_noise() -> None:
-    """A tone in the band of the motion is kept; one beyond that of the drive's force is nearly gone."""
-    believed = Stage.from_dict({**STAGE, "sensor": {"noise": 5e-7, "resolution": 1e-8}})
-    balance = ForceBalance(believed, load_data([run(believed, there_and_back(20.0))]))
-    baseline(balance)
-    time = balance.plain([s.time for s in balance.data.segments])
-    most = 0.4 / float(np.median(np.diff(time)))
-    left = [
-        float(np.std(as_seen(balance, np.sin(2.0 * np.pi * hertz * time))) * np.sqrt(2.0))
-        for hertz in (1.0, min(2.0 * balance.force_bandwidth, most))
-    ]
-    assert left[0] > 0.97
-    assert left[1] < 0.1
-    assert noise_seen(balance) < 1.05 * balance.noise_power**0.5
-
-
 def test_noise_is_what_replicates_leave_but_no_more_than_white_noise() -> None:
     """Without any all of the error is above it; from some size on replicates say no more than white noise."""
     balance = ForceBalance(stage(), load_data([run(stage(viscous=30.0), there_and_back())]))
@@ -133,109 +84,6 @@ def test_noise_is_what_replicates_leave_but_no_more_than_white_noise() -> None:
     assert left[0] == pytest.approx(fitter.relative(model))
     assert left[0] > left[1] >= left[2]
     assert min(left) >= fitter.above_noise(model)
-
-
-def test_a_judgement_needs_motion_in_the_reserved_blocks() -> None:
-    believed, moving = stage(), there_and_back(20.0)
-    t = np.arange(moving.size) / 1000.0
-
-    def balance(resting: np.ndarray, rustle: float = 0.0) -> ForceBalance:
-        recording = run(believed, np.where(resting, 0.0, moving))
-        # A controller that differentiates its reading adds to the command what is too fast to move anything.
-        fast = rustle * (-1.0) ** np.arange(moving.size)
-        recording = changed(recording, voltage=recording.columns["voltage"] + fast)
-        found = ForceBalance(believed, load_data([recording]))
-        baseline(found)
-        assert found.blocks == 10
-        return found
-
-    # At rest in the third block of five another is kept; at rest in all but those that go furthest, none.
-    third = np.any([np.abs(t - middle) < 1.6 for middle in (5.0, 15.0)], axis=0)
-    for rustle in (0.0, 0.03):
-        Reserved(balance(third, rustle))
-    with pytest.raises(RecordingError, match=r"nothing moves .*in the part kept for the judgement"):
-        Reserved(balance(np.abs(t - 10.0) < 8.3))
-
-
-@pytest.mark.parametrize("drift", [0.0, 5e-3])
-def test_friction_remembers_the_way_to_a_window(drift: float) -> None:
-    """The way that the axis went: what the sensor did to the reading on the way is undone as well."""
-    believed, whole = stage(), run(stage(), there_and_back(72.0))
-    balance = ForceBalance(believed, load_data([whole]))
-    sensors = [build({"name": "sensor-drift", "drift": drift, "time_constant": 20.0})] if drift else []
-    windows, (everything,) = balance.data.segments, load_data([cut(whole, 0, MOST_ROWS)]).segments
-    assert len(windows) > 1 and everything.before is None
-    assert way_there(windows[0], [build({"name": "sensor-delay", "delay": 1e-3})]) is None
-
-    def units(segment: Segment, path: Path) -> Floats:
-        return balance._units(segment, path, balance._start(segment, sensors), [], [], None)
-
-    path = balance._path(everything, sensors)
-    along = units(everything, path)
-    inside = [w for w in windows[1:] if w.time[-1] < everything.time[-1]]
-    assert inside
-    for window in inside:
-        first = round(float(window.time[0]) * 1000.0)
-        part = path.part(slice(first, first + window.time.size))
-        stops = slice(2 + balance.reaches.size // 2, None)  # short ones forget the way at once
-        assert units(window, part)[10:-10, stops] == pytest.approx(
-            along[first + 10 : first + window.time.size - 10, stops], abs=0.02 * float(balance.reaches[-1])
-        )
-
-
-def test_what_swings_remembers_the_way_to_a_window() -> None:
-    """A mass that swings for seconds: in a window it swings as it does in the whole recording."""
-    swings = build({"name": "resonance", "mass_ratio": 0.4, "frequency": 7.0, "damping": 0.01})
-    believed, whole = stage(), run(stage(), there_and_back(72.0))
-    balance = ForceBalance(believed, load_data([whole]))
-    (everything,) = load_data([cut(whole, 0, MOST_ROWS)]).segments
-    path = balance._path(everything, [])
-    _, along = led_there(believed, [swings], everything, path)
-    inside = [w for w in balance.data.segments[1:] if w.time[-1] < everything.time[-1]]
-    assert inside
-    for window in inside:
-        rows = slice(round(float(window.time[0]) * 1000.0), round(float(window.time[-1]) * 1000.0) + 1)
-        mass, push = led_there(believed, [swings], window, path.part(rows))
-        np.testing.assert_allclose(push, along[rows], atol=0.03 * float(np.abs(along).max()))
-        np.testing.assert_allclose(mass, 0.6 * believed.mass)
-
-
-@given(st.lists(st.floats(-3.0, 3.0), min_size=4, max_size=4), st.floats(0.0, 1.0))
-@settings(max_examples=50, deadline=None)
-def test_between_rows_a_position_is_the_cubic_through_both(terms: list[float], share: float) -> None:
-    cubic = np.polynomial.Polynomial(terms)
-    time = np.arange(4) * 0.5
-    motion = np.column_stack([time, cubic(time), cubic.deriv()(time), np.zeros(4), np.zeros(4)])
-    assert between_rows(motion, 2, share) == pytest.approx(float(cubic(1.0 - 0.5 * share)), abs=1e-9)
-
-
-def test_a_replicate_of_averaged_rows_is_read_in_counts() -> None:
-    """At rest a reading stays at its count, however many rows are averaged."""
-    coarse = stage().with_changes(sensor={"noise": 1e-7, "resolution": 1e-6})
-    moving = there_and_back(40.0)
-    resting = np.where(np.arange(moving.size) % 10_000 < 4000, 0.0, moving)
-    data = load_data([run(coarse, resting)], bandwidth=12.0)
-    assert data.averaged > 1
-    made = replicate(coarse, data, [s.position for s in data.segments], 1e-7, seed=3)
-    assert made is not None
-    (segment,) = made.segments
-    assert segment.source is not None
-    counts = segment.source.position / 1e-6
-    assert counts == pytest.approx(np.round(counts), abs=1e-6)
-    assert segment.position == pytest.approx(
-        segment.source.position.reshape(-1, data.averaged).mean(axis=1), abs=1e-12
-    )
-
-
-def test_a_stage_faster_than_any_row_tells_has_no_replicate_and_is_far_off() -> None:
-    """Damping on hardly any mass: its simulation would not end, nor listen to Ctrl-C."""
-    believed = stage()
-    balance = ForceBalance(believed, load_data([run(believed, there_and_back(20.0))]))
-    baseline(balance)
-    quick = stage(mass=2e-3, micro_damping=1e5)
-    assert left_by(quick, balance) is None
-    low, high = balance.data.stroke
-    assert np.abs(Windows.of(balance).off(quick)) == pytest.approx(high - low)
 
 
 def test_a_fit_is_blind_to_reserved_rows() -> None:
