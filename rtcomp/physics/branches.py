@@ -114,9 +114,11 @@ class NonCongruentFriction(Effect):
     steep by 1 - softening at its level, where it is unchanged. In the form `elements` so is the force of each
     element of a friction model by its deflection over its reach; a model without elements is one element. In
     the form `branches` a branch that begins at the force F_r is steeper by 1 + softening (1 - |F_r| / level)
-    than the model's own, and leads to where that does (`ClosingBranches`). A
-    bent output keeps what a memory without drift needs: closed loops stay closed, wiping-out holds, and loops
-    dissipate; only congruency is lost. For that the bend of the whole force must be monotone (softening at
+    than the model's own, below 0 by 1 - softening |F_r| / level, and leads to where that does
+    (`ClosingBranches`).
+
+    A bent output keeps what a memory without drift needs: closed loops stay closed, wiping-out holds, and
+    loops dissipate; only congruency is lost. For that the bend of the whole force must be monotone (softening at
     most 1), or small loops close to the level would give energy. An element is a spring that slips at its
     reach: bent in any way, it stores energy while it sticks and loses it while it slips. It needs a friction
     model in the stage; of damping nothing is bent.
@@ -134,7 +136,7 @@ class NonCongruentFriction(Effect):
     says = "contacts are softer the more they carry: loops at high force are flatter than those around zero"
     equation = (
         "F <- F (1 + softening (1 - |F| / level)), or z_i <- z_i (1 + softening (1 - |z_i| / r_i)), "
-        "or branches of exponent 1 + softening (1 - |F_r| / level)"
+        "or branches of exponent 1 + softening (1 - |F_r| / level), below 0 1 - softening |F_r| / level"
     )
     source = "Mayergoyz (1991), Mathematical Models of Hysteresis; Kuhnen (2003), European J. Control 9(4)"
     signature = "residual force odd in the friction force, largest at half of its level"
