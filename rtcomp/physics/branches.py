@@ -118,8 +118,8 @@ class NonCongruentFriction(Effect):
     (`ClosingBranches`).
 
     A bent output keeps what a memory without drift needs: closed loops stay closed, wiping-out holds, and
-    loops dissipate; only congruency is lost. For that the bend of the whole force must be monotone (softening at
-    most 1), or small loops close to the level would give energy. An element is a spring that slips at its
+    loops dissipate; only congruency is lost. For that the bend of the whole force must be monotone (softening
+    at most 1), or small loops close to the level would give energy. An element is a spring that slips at its
     reach: bent in any way, it stores energy while it sticks and loses it while it slips. It needs a friction
     model in the stage; of damping nothing is bent.
     """
