@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -26,7 +27,7 @@ PLAINER = 1e-3
 TOO_MUCH = "{:.0f} % of what there is without it is left, more than noise"
 NOT_SHOWN = "it does not show in {}"
 WEIGHTLESS = "beside it nothing of the mass is left"
-STANDS_IN = "a force that goes by {} explains more, and more than noise is left"
+STANDS_IN = "a force that goes by {} explains more{}, and more than noise is left"
 
 
 def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, everything: float) -> bool:
@@ -99,6 +100,8 @@ class Doubt:
     """Part that is left of what there is without it, squared and above the noise."""
     denied: bool = False
     """Whether it is the other objective that does not show it."""
+    together: tuple[int, ...] = ()
+    """Numbers of the effects that are no finding together, this one among them."""
 
 
 def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
@@ -108,7 +111,8 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
     beside it than noise and a part of what there is without it: what else makes the rest may make that part
     as well. The part is the geometric mean of that of the force and of that as the objective weighs it. What
     replicates of the model leave too is not counted as left. Or, where more than noise is left, a force that
-    is any function of one thing explains more. Or it does not show in the other objective.
+    is any function of one thing explains more than it, or than several of them. Or it does not show in the
+    other objective.
     """
     said = []
     more = null is not None and null.p_of_error(chosen.errors) < LEVEL
@@ -119,31 +123,51 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
         left, elsewhere = 1.0, False
         if not why:
             without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
-            forms = _only_forms(fitter, chosen, i)
-            rest = in_any_form(fitter, chosen, forms)
+            rest = in_any_form(fitter, chosen, _only_forms(fitter, chosen, (i,)))
             left = math.sqrt(
                 _of_the_force(fitter, rest, without, null) * _as_weighed(fitter, rest, without, null)
             )
             why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""
-            if not why and more and fitter.by_force:
-                force, errors = force_of(fitter, chosen, i), errors_beside(fitter, chosen, forms)
-                other = rival(fitter, without, errors, force, chosen.entries[i])
-                why = STANDS_IN.format(other) if other else ""
+            if not why and more:
+                other = _outdone(fitter, chosen, without, (i,))
+                why = STANDS_IN.format(other, "") if other else ""
             elsewhere = not why and denied(fitter, chosen, without)
             if elsewhere:
                 why = NOT_SHOWN.format("simulated positions" if fitter.by_force else "forces")
         said.append(Doubt(why, left, elsewhere))
-    return said
+    return said if any(one.why for one in said) or not more else _together(fitter, chosen, said)
 
 
-def _only_forms(fitter: Fitter, chosen: Fitted, at: int) -> Floats:
-    """Return the columns (q, n) of what makes no effect number `at` doubtful where it is left.
+def _together(fitter: Fitter, chosen: Fitted, said: Sequence[Doubt]) -> list[Doubt]:
+    """Return what was said of each effect, with the most of them that a force by one thing outdoes."""
+    count = len(chosen.terms)
+    for some in (s for size in range(count, 1, -1) for s in combinations(range(count), size)):
+        without = fitter.fit([t for i, t in enumerate(chosen.terms) if i not in some], chosen)
+        other = _outdone(fitter, chosen, without, some)
+        if other:
+            names = " and ".join(ent.names(chosen.entries)[i] for i in some)
+            why = STANDS_IN.format(other, f" than {names} together")
+            return [replace(one, why=why, together=some) if i in some else one for i, one in enumerate(said)]
+    return list(said)
 
-    By another law of what it goes by it is the same effect; the others may be of another form, and the
+
+def _outdone(fitter: Fitter, chosen: Fitted, without: Fitted, some: Sequence[int]) -> str:
+    """Return what a force goes by that explains more than `some` effects of a model, "" for none."""
+    if not fitter.by_force:
+        return ""
+    errors = errors_beside(fitter, chosen, _only_forms(fitter, chosen, some))
+    replaced = [(chosen.entries[i], force_of(fitter, chosen, i)) for i in some]
+    return rival(fitter, without, errors, replaced)
+
+
+def _only_forms(fitter: Fitter, chosen: Fitted, some: Sequence[int]) -> Floats:
+    """Return the columns (q, n) of what makes none of `some` effects doubtful where it is left.
+
+    By another law of what it goes by each is the same effect; the others may be of another form, and the
     friction of another shape.
     """
-    forms = [fitter.forms_of(chosen, j) for j in range(len(chosen.terms)) if j != at]
-    return np.concatenate([fitter.variants(chosen, at), fitter.other_friction(chosen), *forms])
+    each = [(fitter.variants if i in some else fitter.forms_of)(chosen, i) for i in range(len(chosen.terms))]
+    return np.concatenate([fitter.other_friction(chosen), *each])
 
 
 def _of_the_force(fitter: Fitter, rest: Fitted, without: Fitted, null: Null | None) -> float:

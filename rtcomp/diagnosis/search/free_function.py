@@ -1,13 +1,14 @@
-"""A force that is any function of one thing, as a rival of an effect.
+"""A force that is any function of one thing, as a rival of effects.
 
 A name has no rival outside the catalogue. Where more than noise is left beside it, an unknown cause makes
 that rest, and may make all of it. What goes by one thing (position, speed, time, ...) by a law that nobody
-knows is such a cause: where it takes away more than the effect in any form, the effect stands in for it.
+knows is such a cause: where it takes away more than an effect in any form, the effect stands in for it. So do
+several together: a wave, a stop and a spring that are a bump of force.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -26,33 +27,33 @@ KNOTS = 16
 """Knots of a function at quantiles of what it goes by, joined by straight lines."""
 
 
-def rival(fitter: Fitter, without: Fitted, errors: Floats, force: Floats, entry: Entry) -> str:
-    """Return what a force goes by that explains more than an effect, "" where there is none.
+def rival(fitter: Fitter, without: Fitted, errors: Floats, replaced: Sequence[tuple[Entry, Floats]]) -> str:
+    """Return what a force goes by that explains more than some effects, "" where there is none.
 
-    It stands in the place of the effect, an `entry`, beside the model `without` that. `errors` (B_use,) are
-    those of the effect in any form, `force` (N, (n,)) is its own, as large as which the function is believed
-    to be. A spring by any law is a spring: of what is a smooth function of the position, another one is a
-    form. And beside a law that no number bends, as a damping by direction, what explains more is a further
-    effect.
+    It stands in the place of those `replaced`, entries with their forces (N, (n,)), beside a model `without`
+    them. `errors` (B_use,) are those of the effects in any form; as large as the largest of them the function
+    is believed to be. A spring by any law is a spring: of what alone is a smooth function of the position,
+    another one is a form. And beside laws that no number bends, as a damping by direction, what explains more
+    is a further effect.
     """
-    size = float(np.std(force))
+    size = max(float(np.std(force)) for _, force in replaced)
     if not np.isfinite(size) or size == 0.0:
         return ""
     balance = fitter.balance
-    own = None if ent.shape_parameters(entry) else as_white(balance, force)
+    laws = [as_white(balance, force) for entry, force in replaced if not ent.shape_parameters(entry)]
+    spring = len(replaced) == 1 and of_position(balance, replaced[0][0]).size > 0
     gains = {
         name: log_gain(errors, errors_beside(fitter, without, size * columns))
         for name, columns in _functions(balance)
-        if not (name == "position" and of_position(balance, entry).size) and not _one_of(columns, own)
+        if not (name == "position" and spring)
+        and not (len(laws) == len(replaced) and all(_one_of(columns, law) for law in laws))
     }
     best = max(gains, key=lambda name: gains[name], default="")
     return best if best and gains[best] > 0.0 else ""
 
 
-def _one_of(columns: Floats, law: Floats | None) -> bool:
+def _one_of(columns: Floats, law: Floats) -> bool:
     """Tell whether a law (n,) is one of the functions that whitened columns (q, n) span."""
-    if law is None:
-        return False
     rest = law - np.linalg.lstsq(columns.T, law, rcond=None)[0] @ columns
     return bool(np.linalg.norm(rest) < SMOOTH * np.linalg.norm(law))
 

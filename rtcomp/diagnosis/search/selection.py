@@ -235,8 +235,10 @@ def _solid(fitter: Fitter, found: Search) -> None:
             return
         at = max(weak, key=lambda i: doubted[i].left)
         found.denied |= doubted[at].denied
-        found.dropped.append(f"{ent.names(found.chosen.entries)[at]} is not named: {doubted[at].why}")
-        kept = [t for i, t in enumerate(found.chosen.terms) if i != at]
+        gone = doubted[at].together or (at,)
+        names = " and ".join(ent.names(found.chosen.entries)[i] for i in gone)
+        found.dropped.append(f"{names} is not named: {doubted[at].why}")
+        kept = [t for i, t in enumerate(found.chosen.terms) if i not in gone]
         found.chosen, found.alternatives, found.beside = fitter.fit(kept, found.chosen), [], None
         # What is left is judged by replicates of the model that leaves it.
         found.null = found.nulls.get(_effects_of(found.chosen), found.null)

@@ -185,7 +185,7 @@ def test_a_force_that_goes_by_one_thing_by_an_unknown_law_is_a_rival_of_a_name()
         period = 1.0e-4 if found else 3.0e-4
         model = fitter.fit([Term.of({**wave, "period": period})], base)
         errors = errors_beside(fitter, model, overtones(fitter, model, model.entries[0]))
-        found.append(rival(fitter, base, errors, force_of(fitter, model, 0), model.entries[0]))
+        found.append(rival(fitter, base, errors, [(model.entries[0], force_of(fitter, model, 0))]))
     assert found == ["position", ""]
 
 
@@ -203,7 +203,7 @@ def test_what_goes_by_speed_beside_a_law_of_speed_that_no_number_bends_is_a_furt
         balance = ForceBalance(believed, load_data([replace(recording, columns=pushed)]))
         base, fitter = baseline(balance), Fitter(balance)
         model = fitter.fit([Term.of(entry)], base)
-        found.append(rival(fitter, base, model.errors, force_of(fitter, model, 0), model.entries[0]))
+        found.append(rival(fitter, base, model.errors, [(model.entries[0], force_of(fitter, model, 0))]))
     assert found == ["", "speed"]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from recorded import run, stage, there_and_back
@@ -39,3 +41,26 @@ def test_a_drive_that_gives_nothing_and_friction_that_holds_the_rest_explain_not
     true = fitter.fit([Term.of({**STRIBECK, "rise": 0.2})], base)
     assert true.sse < 0.05 * base.sse
     assert accepted(fitter, true, base, null, float(base.errors.sum()))
+
+
+def test_effects_that_are_a_bump_only_together_are_no_finding() -> None:
+    """A wave, a stop and a spring, each of which the others need; not so where each is there."""
+    axis, reference = stage(), there_and_back(20.0)
+    terms = [
+        {"name": "cogging", "amplitude": 1.0, "period": 3e-4, "phase": 0.3},
+        {"name": "end-stop", "stiffness": 1e4, "position": 1e-4},
+        {"name": "parallel-spring", "stiffness": 1e4, "cubic": -1e11},
+    ]
+    recording = run(axis, reference)
+    bump = np.exp(-(((recording.position - 0.8e-4) / 4e-5) ** 2))
+    pushed = {**recording.columns, "voltage": recording.voltage + bump / axis.force_constant}
+    made = []
+    for one in (replace(recording, columns=pushed), run(stage(effects=terms), reference)):
+        balance = ForceBalance(axis, load_data([one]))
+        base, fitter = baseline(balance), Fitter(balance)
+        model = fitter.fit([Term.of(entry) for entry in terms], base)
+        null = Null(np.linspace(0.0, 0.01, 19), np.tile(0.1 * model.errors, (19, 1)))
+        made.append(doubts(fitter, model, null))
+    assert all("position" in doubt.why for doubt in made[0])
+    assert max(len(doubt.together) for doubt in made[0]) > 1
+    assert not any(doubt.why for doubt in made[1])
