@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.result import Diagnosis, Place
 from rtcomp.diagnosis.search.confidence import alternatives
 from rtcomp.diagnosis.search.selection import LOOKED, Search, search
-from rtcomp.diagnosis.search.ways import Left, alike, least_left, outdone
+from rtcomp.diagnosis.search.ways import Left, alike, doubted
 from rtcomp.diagnosis.settings import BUDGET, LEFT
 from rtcomp.diagnosis.verdict.answer import Rest, answer
 from rtcomp.diagnosis.verdict.validation import Reserved
@@ -184,29 +185,34 @@ def _searched(
     What is missing may hide which way the command goes between rows, and the wrong way looks like a delay.
     The other is searched where a model found fits better there, or where the first leaves more than noise.
     Where both do, the second must leave as little of what the first leaves as an effect of what there is
-    without it.
+    without it. Where each only makes up for the other way, what was found before that counts.
     """
     best = objectives[0]
     if len(objectives) == 1:
         return best.fitter, search(best.fitter, best.base, ends, say, seed)
     blocks = alike(*(one.balance for one in objectives))
-
-    def doubted(model: Fitted) -> bool:
-        own, first = (Left.by(best.fitter, one, blocks[0]) for one in (model, best.base))
-        other = Fitter(objectives[1].balance)
-        other.offset = best.fitter.offset
-        same, fewer = (least_left(other, some, blocks[1], ends) for some in (model.terms, model.terms[:-1]))
-        return outdone(first, own, same, fewer)
-
-    found = search(best.fitter, best.base, ends, say, seed, doubted, best.first)
+    fitter = Fitter(objectives[1].balance)
+    found = search(
+        best.fitter,
+        best.base,
+        ends,
+        say,
+        seed,
+        partial(doubted, best.fitter, best.base, fitter, blocks, ends),
+        best.first,
+    )
     told = not Rest.of(best.fitter, found).significant
     if not found.doubted and (told or clock.now() > ends):
         return best.fitter, found
-    fitter = Fitter(objectives[1].balance)
     settle(fitter)
-    other = search(fitter, with_offset(fitter, fitter.fit([])), ends, say, seed)
-    if found.doubted or not Rest.of(fitter, other).significant:
+    base = with_offset(fitter, fitter.fit([]))
+    doubt = partial(doubted, fitter, base, best.fitter, blocks[::-1], ends)
+    other = search(fitter, base, ends, say, seed, doubt)
+    if found.doubted != other.doubted:
+        return (best.fitter, found) if other.doubted else (fitter, other)
+    if not found.doubted and not Rest.of(fitter, other).significant:
         return fitter, other
     both = zip((best.fitter, fitter), (found, other), blocks, strict=True)
     left, left_there = (Left.by(one, by.chosen, some).weighed for one, by, some in both)
-    return (fitter, other) if left_there < left + math.log(LEFT) else (best.fitter, found)
+    least = 0.0 if found.doubted else math.log(LEFT)
+    return (fitter, other) if left_there < left + least else (best.fitter, found)

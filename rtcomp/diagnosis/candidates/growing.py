@@ -10,12 +10,12 @@ from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.candidates.effects import Candidate, started
 from rtcomp.diagnosis.candidates.scanning import scanned
-from rtcomp.diagnosis.candidates.screening import Screened
+from rtcomp.diagnosis.candidates.screening import Look, Screened
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
-from rtcomp.diagnosis.settings import FULL_FITS
+from rtcomp.diagnosis.settings import FULL_FITS, LEAST_GAIN
 from rtcomp.errors import ConfigError
 
 
@@ -33,6 +33,18 @@ def grow(
     terms += [one for term in behind.values() for one in scanned(fitter, model, term, ends)]
     found = fitted_in_time(fitter, model, terms, ends)
     return [*found, *fitted_in_time(fitter, model, in_better_form(fitter, found, ends), ends)]
+
+
+def with_event(fitter: Fitter, model: Fitted, seen: Look, ends: float) -> list[Fitted]:
+    """Return the model with what happens once and one more effect, where that explains much of what is there.
+
+    Of the mean over the blocks a single event is little, and where it is large nothing else shows beside it.
+    """
+    events = [c.term for c in seen.candidates if not c.looked and ent.happens_once(ent.kind_of(c.term.entry))]
+    best = min(fitted_in_time(fitter, model, events, ends), key=lambda one: one.sse, default=model)
+    if not best.sse < (1.0 - LEAST_GAIN) ** 2 * model.sse:
+        return []
+    return grow(fitter, best, *seen.beside(best), ends)
 
 
 def in_better_form(fitter: Fitter, found: Sequence[Fitted], ends: float) -> list[Term]:

@@ -243,9 +243,9 @@ class Fitter:
         if start is not None and alike and not newly_behind(terms, start.terms):
             weights = start.weights
         count = max(int(self.rows.sum()), 1)
-        variance = 1.0 if start is None else start.variance
         entries, made_for = [t.entry for t in current], weights
-        system, prior, grams, c, sse = self.solve(current, made_for, variance)
+        # From the variance of noise upwards: one that another model leaves makes too much of the belief.
+        system, prior, grams, c, sse = self.solve(current, made_for, 1.0)
         variance = sse / count
         if by_weights(b, entries):
             made_for, current = c[b.friction], self._sized(current, system, c)

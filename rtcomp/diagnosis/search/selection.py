@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.candidates.effects import Candidate
-from rtcomp.diagnosis.candidates.growing import fitted_in_time, grow
+from rtcomp.diagnosis.candidates.growing import fitted_in_time, grow, with_event
 from rtcomp.diagnosis.candidates.screening import Look, Screen, Screened, look
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting.baseline import settle
@@ -113,6 +113,7 @@ def search(
             break
         grown, short = _grown(fitter, beam, judged, null.p_value(judged.gain) < LEVEL, ends)
         grown += _in_other_forms(fitter, found, grown, ends)
+        grown += with_event(fitter, beam[0], judged, ends)
         _skipped(found, short)
         fit = [g for g in grown if accepted(fitter, g, _parent(g, beam), null, everything)]
         good = _distinct(sorted(fit, key=score))[:BEAM]
@@ -156,7 +157,7 @@ def _grown(
         if 2.0 * moment - began > ends:
             return grown, True
         began = moment
-        grown += grow(fitter, other, *_beside(other, seen), ends)
+        grown += grow(fitter, other, *seen.beside(other), ends)
         # Both together were begun from what the best had alone, which may be bent to do without this one.
         last = beam[0].terms[-1:]
         missing = [t for t in last if t.entry["name"] not in ent.names(other.entries)]
@@ -177,20 +178,6 @@ def _in_other_forms(fitter: Fitter, found: Search, grown: Sequence[Fitted], ends
     near = [m for m in alike if score(m) < score(found.chosen) + NEAR]
     last = min(larger, key=score).terms[-1:]
     return [model for other in near for model in fitted_in_time(fitter, other, last, ends)]
-
-
-def _beside(other: Fitted, seen: Look) -> tuple[list[Candidate], list[Screened]]:
-    """Return the candidates that were `seen` beside another model of equal size, and their gains beside this.
-
-    What an effect changes is much the same beside either; where it begins to be fitted is all that is needed.
-    """
-    own = ent.names(other.entries)
-    pairs = [
-        pair
-        for pair in zip(seen.candidates, seen.screen.beside(other), strict=True)
-        if pair[0].name not in own
-    ]
-    return [candidate for candidate, _ in pairs], [gain for _, gain in pairs]
 
 
 def _better(fitter: Fitter, model: Fitted, chosen: Fitted, null: Null, everything: float) -> bool:
@@ -329,8 +316,10 @@ def _sound(seen: Look, parent: float) -> Look | None:
 
 
 def _parent(model: Fitted, beam: Sequence[Fitted]) -> Fitted:
-    names = ent.names(model.entries)[:-1]
-    return next(b for b in beam if ent.names(b.entries) == names)
+    """Return the largest model that a model was grown from."""
+    names = ent.names(model.entries)
+    own = [b for b in beam if len(b.terms) < len(names) and ent.names(b.entries) == names[: len(b.terms)]]
+    return max(own, key=lambda b: len(b.terms))
 
 
 def _distinct(models: Sequence[Fitted]) -> list[Fitted]:

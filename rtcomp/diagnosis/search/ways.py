@@ -48,6 +48,20 @@ def alike(one: ForceBalance, other: ForceBalance) -> list[np.ndarray]:
     return [~one.reserved & ~other.reserved] * 2
 
 
+def doubted(
+    fitter: Fitter, base: Fitted, other: Fitter, blocks: Sequence[np.ndarray], ends: float, model: Fitted
+) -> bool:
+    """Tell whether a model (beside the baseline `base`) does worse than its effects by the other way.
+
+    `blocks` are those on which either way is measured; the `other` is left as it is.
+    """
+    own, first = (Left.by(fitter, one, blocks[0]) for one in (model, base))
+    there = other.on(other.balance.data)
+    there.offset = fitter.offset
+    same, fewer = (least_left(there, some, blocks[1], ends) for some in (model.terms, model.terms[:-1]))
+    return outdone(first, own, same, fewer)
+
+
 def least_left(fitter: Fitter, terms: Sequence[Term], blocks: np.ndarray, ends: float) -> Left:
     """Return what effects leave, the last of them in the form that suits this way."""
     settle(fitter, terms, ends)
