@@ -201,3 +201,17 @@ def test_a_stiff_axis_is_smoothed_less_and_a_soft_one_by_wiener() -> None:
         balance.smooth_for(1.0)
         sse[axis.mass] = least / Fitter(balance).fit([], steps=0).sse
     assert sse[4.3] < 0.5 and sse[2.0] == pytest.approx(1.0)
+
+
+def test_a_model_fits_as_well_whatever_a_poorer_one_left_before_it() -> None:
+    """Far more than noise: a belief that is thirty times off would count as if it were all that is known."""
+    there = [{"name": "constant-force", "force": 0.5}, {"name": "parallel-spring", "stiffness": 2e4}]
+    believed = stage(micro_damping=0.0, effects=[{"name": "parallel-spring", "stiffness": 1.8e4}])
+    recording = run(stage(micro_damping=0.0, viscous=240.0, effects=there), there_and_back(12.0))
+    balance = ForceBalance(believed, load_data([recording]))
+    base, fitter = baseline(balance), Fitter(balance)
+    push = [Term.of({"name": "constant-force", "force": 0.1})]
+    after, alone = fitter.fit(push, base), fitter.fit(push)
+    assert base.sse > 100.0 * alone.sse
+    assert alone.coefficients[1] == pytest.approx(240.0, rel=0.02)
+    assert after.sse == pytest.approx(alone.sse, rel=0.01)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,9 +12,10 @@ from recorded import run, stage, there_and_back
 
 from rtcomp.diagnosis.fitting.baseline import baseline
 from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.recordings.data import load_data
-from rtcomp.diagnosis.search.ways import Left, alike, outdone
+from rtcomp.diagnosis.search.ways import Left, alike, doubted, outdone
 
 LOGARITHMS = st.floats(-12.0, 0.0)
 
@@ -50,3 +53,18 @@ def test_a_part_of_the_force_that_does_not_matter_makes_no_delay() -> None:
     first, own = Left(-10.8, -8.0), Left(-16.1, -10.3)
     assert outdone(first, own, Left(-15.38, -10.2), Left(-15.38, -10.29))
     assert not outdone(first, own, Left(-15.38, -10.2), Left(-12.0, -8.5))
+
+
+def test_a_delay_of_half_a_row_only_makes_up_for_the_way_that_the_command_goes() -> None:
+    """Not so a wave of force. And the other way is left as it was."""
+    wave = {"name": "cogging", "amplitude": 0.5, "period": 1e-4, "phase": 0.0}
+    recording = run(stage(effects=[wave]), there_and_back(20.0))
+    balances = [ForceBalance(stage(), load_data([recording], held=held)) for held in (False, True)]
+    bases = [baseline(one) for one in balances]
+    wrong, right = (Fitter(one) for one in balances)
+    blocks, reaches = alike(*balances), balances[1].reaches
+    model = wrong.fit([Term.of(wave)], bases[0])
+    late = wrong.fit([*model.terms, Term.of({"name": "drive-delay", "delay": 5e-4})], model)
+    assert doubted(wrong, bases[0], right, blocks, math.inf, late)
+    assert not doubted(right, bases[1], wrong, blocks[::-1], math.inf, right.fit([Term.of(wave)], bases[1]))
+    assert balances[1].reaches is reaches
