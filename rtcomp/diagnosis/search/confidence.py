@@ -56,7 +56,8 @@ class Alternatives:
 def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternatives]:
     """Return the chosen effects, each with its set; stops looking at the time `ends`.
 
-    Where a plainer model that is likelier cannot be told from the chosen one, it is chosen from then on.
+    Where a plainer model that is likelier cannot be told from the chosen one, it is chosen from then on. So
+    is one as plain that is better.
     """
     done: list[Alternatives] = []
     while len(done) < len(found.chosen.terms):
@@ -66,14 +67,19 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         errors = [_by_cell(fitter, m) for m in models]
         errors, rows = above_noise(found, errors, _independent(fitter, chosen) / errors[0].size)
         weight = probabilities(errors, rows, [m.size for m in models])
+        alike = set(confidence_set(errors, SET_LEVEL))
         least = (1.0 - ALIAS) * log_gain(rest.errors, chosen.errors)
-        members = {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
-        members |= set(confidence_set(errors, SET_LEVEL))
+        members = alike | {0} | {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
         members -= {k for k in members if k and explains_another(fitter, chosen, rest, models[k], ends)}
-        plainer = min(members, key=lambda k: (models[k].size, -weight[k]))
-        if models[plainer].size < chosen.size and weight[plainer] > weight[0]:
-            found.alternatives = [m for m in found.alternatives if m is not models[plainer]] + [chosen]
-            found.chosen, found.beside, done = models[plainer], None, []
+        if 0 in alike:
+            plainer = min(members, key=lambda k: (models[k].size, -weight[k]))
+            instead = plainer if models[plainer].size < chosen.size and weight[plainer] > weight[0] else 0
+        else:
+            as_plain = [k for k, m in enumerate(models) if m.size <= chosen.size]
+            instead = min(as_plain, key=lambda k: float(np.log(errors[k]).sum()))
+        if instead:
+            found.alternatives = [m for m in found.alternatives if m is not models[instead]] + [chosen]
+            found.chosen, found.beside, done = models[instead], None, []
             continue
         plainest = min(models[k].size for k in members)
         enough = max(weight[k] for k in members if models[k].size == plainest)
