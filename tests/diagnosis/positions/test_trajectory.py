@@ -252,8 +252,11 @@ def test_friction_that_grows_with_the_load_is_named(loaded: list[Recording]) -> 
     done = diagnose(stage(), loaded, budget=200.0)
     assert done.verdict == "missing-physics"
     assert "load-dependent-friction" in done.effects[0].names
-    assert done.position is not None and done.position.after < 0.4 * done.position.retuned
-    assert done.to_json()["fit"]["position_error"]["after"] == done.position.after
+    if done.position is None:  # forces tell it: nothing but noise is left of them
+        assert done.fit.after < done.fit.floor < done.fit.retuned
+    else:
+        assert done.position.after < 0.4 * done.position.retuned
+        assert done.to_json()["fit"]["position_error"]["after"] == done.position.after
 
 
 @pytest.mark.slow
