@@ -192,15 +192,8 @@ def _searched(
         return best.fitter, search(best.fitter, best.base, ends, say, seed)
     blocks = alike(*(one.balance for one in objectives))
     fitter = Fitter(objectives[1].balance)
-    found = search(
-        best.fitter,
-        best.base,
-        ends,
-        say,
-        seed,
-        partial(doubted, best.fitter, best.base, fitter, blocks, ends),
-        best.first,
-    )
+    doubt = partial(doubted, best.fitter, best.base, fitter, blocks, ends)
+    found = search(best.fitter, best.base, ends, say, seed, doubt, best.first)
     told = not Rest.of(best.fitter, found).significant
     if not found.doubted and (told or clock.now() > ends):
         return best.fitter, found
@@ -214,5 +207,5 @@ def _searched(
         return fitter, other
     both = zip((best.fitter, fitter), (found, other), blocks, strict=True)
     left, left_there = (Left.by(one, by.chosen, some).weighed for one, by, some in both)
-    least = 0.0 if found.doubted else math.log(LEFT)
-    return (fitter, other) if left_there < left + least else (best.fitter, found)
+    most = left if found.doubted else left + math.log(LEFT)
+    return (fitter, other) if left_there < most else (best.fitter, found)

@@ -36,7 +36,7 @@ def grow(
 
 
 def with_event(fitter: Fitter, model: Fitted, seen: Look, ends: float) -> list[Fitted]:
-    """Return the model with what happens once and one more effect, where that explains much of what is there.
+    """Return the model with an event and one more effect, where the event alone explains what matters.
 
     Of the mean over the blocks a single event is little, and where it is large nothing else shows beside it.
     """

@@ -145,8 +145,7 @@ def _together(fitter: Fitter, chosen: Fitted, said: Sequence[Doubt]) -> list[Dou
         without = fitter.fit([t for i, t in enumerate(chosen.terms) if i not in some], chosen)
         other = _outdone(fitter, chosen, without, some)
         if other:
-            names = " and ".join(ent.names(chosen.entries)[i] for i in some)
-            why = STANDS_IN.format(other, f" than {names} together")
+            why = STANDS_IN.format(other, " than they do together")
             return [replace(one, why=why, together=some) if i in some else one for i, one in enumerate(said)]
     return list(said)
 

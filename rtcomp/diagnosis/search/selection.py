@@ -113,7 +113,6 @@ def search(
             break
         grown, short = _grown(fitter, beam, judged, null.p_value(judged.gain) < LEVEL, ends)
         grown += _in_other_forms(fitter, found, grown, ends)
-        grown += with_event(fitter, beam[0], judged, ends)
         _skipped(found, short)
         fit = [g for g in grown if accepted(fitter, g, _parent(g, beam), null, everything)]
         good = _distinct(sorted(fit, key=score))[:BEAM]
@@ -162,6 +161,7 @@ def _grown(
         last = beam[0].terms[-1:]
         missing = [t for t in last if t.entry["name"] not in ent.names(other.entries)]
         grown += fitted_in_time(fitter, other, missing, ends)
+    grown += with_event(fitter, beam[0], seen, ends)
     return grown, clock.now() > ends
 
 
@@ -223,8 +223,8 @@ def _solid(fitter: Fitter, found: Search) -> None:
         at = max(weak, key=lambda i: doubted[i].left)
         found.denied |= doubted[at].denied
         gone = doubted[at].together or (at,)
-        names = " and ".join(ent.names(found.chosen.entries)[i] for i in gone)
-        found.dropped.append(f"{names} is not named: {doubted[at].why}")
+        names = ", ".join(ent.names(found.chosen.entries)[i] for i in gone)
+        found.dropped.append(f"{names} {'are' if len(gone) > 1 else 'is'} not named: {doubted[at].why}")
         kept = [t for i, t in enumerate(found.chosen.terms) if i not in gone]
         found.chosen, found.alternatives, found.beside = fitter.fit(kept, found.chosen), [], None
         # What is left is judged by replicates of the model that leaves it.
