@@ -38,6 +38,13 @@ class Fitted:
     variance: float
     weights: Floats
     """N/m of the friction units."""
+    off: Floats | None = None
+    """(p + q,): by how much the numbers of its replicates are off on average; None where there are none."""
+
+    @property
+    def whole(self) -> Floats:
+        """Its coefficients, and no change of its nonlinear parameters, (p + q,)."""
+        return np.append(self.coefficients, np.zeros(len(self.free)))
 
     @property
     def size(self) -> int:

@@ -35,7 +35,8 @@ def told(fitter: Fitter, fitted: Fitted) -> list[Told]:
     """Return the 95 % intervals of each term's parameters.
 
     Blocks of the recording are left out in turn (delete-a-group jackknife: Bell and McCaffrey 2002, Survey
-    Methodology 28(2)); what a single block tells is compared with the rest of the recording.
+    Methodology 28(2)); what a single block tells is compared with the rest of the recording. What replicates
+    are off by was taken off, and is known to no more than its own size.
     """
     from scipy.special import stdtrit
 
@@ -47,8 +48,8 @@ def told(fitter: Fitter, fitted: Fitted) -> list[Told]:
     held = _shapes_held(fitter, fitted)
     for i, (term, span) in enumerate(zip(fitted.terms, spans, strict=True)):
         kind = ent.kind_of(term.entry)
-        without, once = _without(fitted, i, span), _once(fitter, fitted, i, span)
-        alone = _without(held, i, span)
+        without, once = _values(fitted, i, span, fitted.without), _once(fitter, fitted, i, span)
+        alone, off = _values(held, i, span, held.without), _off(fitted, i, span)
         values, neutral = {}, []
         bound = [f.name for f in fitted.free if f.term == i and f.at_bound(fitted.terms)]
         for p in kind.parameters:
@@ -62,7 +63,8 @@ def told(fitter: Fitter, fitted: Fitted) -> list[Told]:
                     apart = (apart + np.pi) % (2.0 * np.pi) - np.pi
                 sd = _deviation(apart)
                 size = 2.0 if p.unit == ent.PHASE else abs(value)
-                half = math.hypot(factor * max(sd, once.get(p.name, 0.0)), MODEL * size)
+                spread = factor * max(sd, once.get(p.name, 0.0))
+                half = math.hypot(spread, off.get(p.name, 0.0), MODEL * size)
                 if p.name not in bound and _at_bound(value, p.lowest, ent.highest(term.entry, p)):
                     bound.append(p.name)
             elif p.name == ent.MOMENT:
@@ -92,8 +94,8 @@ def _shapes_held(fitter: Fitter, fitted: Fitted) -> Fitted:
 def _left_out(fitter: Fitter, fitted: Fitted, numbers: int = 0) -> Fitted:
     """Return the fit with its coefficients `without` each block computed again."""
     grams, wide = fitter.jointly(fitted.system, fitted.prior, fitted.tangents)
-    whole = np.append(fitted.coefficients, np.zeros(len(fitted.free)))
-    return replace(fitted, without=left_out(grams, fitter.use, wide, fitted.variance, whole, numbers)[1])
+    found = left_out(grams, fitter.use, wide, fitted.variance, fitted.whole, numbers)
+    return replace(fitted, without=found[1])
 
 
 def _at_bound(value: float, low: float, high: float) -> bool:
@@ -101,19 +103,27 @@ def _at_bound(value: float, low: float, high: float) -> bool:
     return value >= high - near or (low > 0.0 and value <= low + near)
 
 
-def _without(fitted: Fitted, at: int, span: slice) -> dict[str, Floats]:
-    """Return the values (B,) of each free parameter of a term without each block."""
+def _off(fitted: Fitted, at: int, span: slice) -> dict[str, float]:
+    """Return by how much each free parameter of a term is off in replicates, on average."""
+    if fitted.off is None:
+        return {}
+    found = _values(fitted, at, span, np.array([fitted.whole, fitted.whole + fitted.off]))
+    return {name: float(abs(values[1] - values[0])) for name, values in found.items()}
+
+
+def _values(fitted: Fitted, at: int, span: slice, sets: Floats) -> dict[str, Floats]:
+    """Return the values (S,) of each free parameter of a term by `sets` of coefficients, (S, p + q)."""
     term = fitted.terms[at]
     size = fitted.coefficients.size
     found: dict[str, Floats] = {}
     if span.stop > span.start:
-        made = [ent.composed(term.entry, c[span]) for c in fitted.without]
+        made = [ent.composed(term.entry, c[span]) for c in sets]
         moved = [n for n in made[0] if n in term.free and isinstance(made[0][n], float)]
         found.update({n: np.array([m[n] for m in made]) for n in moved})
     for k, free in enumerate(fitted.free):
         if free.term != at:
             continue
-        values = free.get(fitted.terms) + fitted.without[:, size + k]
+        values = free.get(fitted.terms) + sets[:, size + k]
         plain = np.exp(np.minimum(values, 700.0)) if free.log else values
         found[free.name] = np.clip(plain, free.low, free.high)
     return found
@@ -172,7 +182,8 @@ def numbers(fitter: Fitter, believed: Stage, fitted: Fitted, *, effects: bool = 
     values, sets, sizes = fitter.numbers(_left_out(fitter, fitted, len(BASE)), effects=effects)
     spread = np.maximum(np.diag(scatter(sets)), 0.0)
     factor = float(stdtrit(max(sets.shape[0] - 1, 1), 0.975))
-    half = np.sqrt(factor**2 * spread + (MODEL * values) ** 2 + _of_the_balance(fitter, fitted, values) ** 2)
+    off = _numbers_off(fitter, fitted, values, effects=effects)
+    half = np.sqrt(factor**2 * spread + (MODEL * values) ** 2 + off**2)
     m = believed.mechanics
     before = np.array([m.mass, m.viscous, m.micro_damping, *believed_friction(believed), *np.abs(sizes)])
     own = [(ent.kind_of(e), n) for e in fitter.balance.believed if effects for n in ent.amounts_of(e)]
@@ -180,8 +191,14 @@ def numbers(fitter: Fitter, believed: Stage, fitted: Fitted, *, effects: bool = 
     return Numbers(before, values, half, units)
 
 
-def _of_the_balance(fitter: Fitter, fitted: Fitted, values: Floats) -> Floats:
-    """Return by how much each number could be another for a part of the force, (q,); nothing of a reach."""
+def _numbers_off(fitter: Fitter, fitted: Fitted, values: Floats, *, effects: bool) -> Floats:
+    """Return by how much numbers of the stage, (q,), are off in replicates.
+
+    Where there are none, how much each could be another for a part of the force; nothing of a reach.
+    """
+    if fitted.off is not None:
+        moved = replace(fitted, without=(fitted.whole + fitted.off)[None])
+        return np.asarray(fitter.numbers(moved, effects=effects)[1][0] - values)
     found = np.zeros(values.size)
     if not fitter.by_force:
         return found

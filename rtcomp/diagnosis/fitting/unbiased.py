@@ -8,7 +8,7 @@ Bootstrap, chapter 10).
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
@@ -25,10 +25,11 @@ def numbers_of(fitter: Fitter, fitted: Fitted) -> Floats:
 def unbiased(fitter: Fitter, fitted: Fitted, numbers: Floats) -> Fitted:
     """Return a fit without the bias that the `numbers` of its replicates, (R, p + q), have on average.
 
-    As it was where the model cannot have such numbers.
+    With the numbers it had where the model cannot have others.
     """
-    own = np.concatenate([fitted.coefficients, np.zeros(len(fitted.free))])
+    off = numbers.mean(axis=0) - fitted.whole
     try:
-        return fitter.moved_by(fitted, own - numbers.mean(axis=0))
+        fitted = fitter.moved_by(fitted, -off)
     except ConfigError:
-        return fitted
+        pass
+    return replace(fitted, off=off)

@@ -8,8 +8,10 @@ from recorded import RATE, run, stage, there_and_back
 
 from rtcomp.diagnosis.fitting.baseline import baseline
 from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.intervals import numbers, told
+from rtcomp.diagnosis.fitting.unbiased import unbiased
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.numerics.spread import MODEL
 from rtcomp.diagnosis.recordings.data import load_data
@@ -58,3 +60,25 @@ def test_a_number_below_what_a_recording_can_show_is_told_to_be_at_its_bound(
     fitter = Fitter(balance)
     found = fitter.fit([Term.of({**creep, "time_constant": 6e-3})])
     assert ("time_constant" in told(fitter, found)[0].bound) is at_bound
+
+
+def test_what_replicates_are_off_by_is_part_of_an_interval() -> None:
+    """It was taken off, and is known to its own size; of a stage's numbers it stands for the balance's error."""
+    spring = {"name": "parallel-spring", "stiffness": 3000.0}
+    believed = stage()
+    balance = ForceBalance(believed, load_data([run(stage(effects=[spring]), there_and_back())]))
+    baseline(balance)
+    fitter = Fitter(balance)
+    model = fitter.fit([Term.of({**spring, "stiffness": 1.0})])
+    off = np.zeros(model.whole.size)
+    off[0], off[balance.size] = 0.05 * model.coefficients[0], 400.0
+    exact, bent = (unbiased(fitter, model, (model.whole + each)[None]) for each in (0.0 * off, off))
+
+    def half(one: Fitted) -> float:
+        value = told(fitter, one)[0].values["stiffness"]
+        return 0.5 * (value.high - value.low)
+
+    assert half(exact) < 0.1 * 400.0 < half(bent) == pytest.approx(400.0, rel=0.1)
+    mass = {str(i): numbers(fitter, believed, one) for i, one in enumerate((model, exact, bent))}
+    sizes = [found.half[0] / found.values[0] for found in mass.values()]
+    assert sizes[1] < sizes[0] and sizes[2] == pytest.approx(0.05, rel=0.15)
