@@ -276,6 +276,11 @@ class Effect:
         """Effects that it needs elsewhere in the chain and that no stage lists."""
         return []
 
+    def elsewhere(self) -> Effect | None:
+        """The effect of the drive or the sensor that puts the same command beside the same reading as this
+        one of the other; None where none does."""
+        return None
+
     def to_dict(self) -> dict[str, Any]:
         """Return the entry as a stage file's ``effects`` lists it; the first form goes without saying."""
         form = {"form": self.form} if self.form not in ("", *list(self.forms)[:1]) else {}

@@ -8,6 +8,7 @@ Bootstrap, chapter 10).
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 from rtcomp.diagnosis.fitting.fit import Fitter
@@ -28,8 +29,6 @@ def unbiased(fitter: Fitter, fitted: Fitted, numbers: Floats) -> Fitted:
     With the numbers it had where the model cannot have others.
     """
     off = numbers.mean(axis=0) - fitted.whole
-    try:
+    with suppress(ConfigError):
         fitted = fitter.moved_by(fitted, -off)
-    except ConfigError:
-        pass
     return replace(fitted, off=off)

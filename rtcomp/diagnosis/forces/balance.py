@@ -22,6 +22,7 @@ from rtcomp.diagnosis.forces.bank import AS_IT_IS
 from rtcomp.diagnosis.forces.blocks import cut
 from rtcomp.diagnosis.forces.noise import Noise, Whitening
 from rtcomp.diagnosis.forces.reaches import MOST_OWN, joined
+from rtcomp.diagnosis.forces.sides import exact
 from rtcomp.diagnosis.forces.signals import BASE, Signals
 from rtcomp.diagnosis.forces.sticking import trust
 from rtcomp.diagnosis.numerics.regression import System
@@ -239,7 +240,8 @@ class ForceBalance(Signals):
         """Return all entries, which of them add a force, and the effects that are at work beside columns."""
         everything = [*self.believed, *entries]
         adding = [ent.adds_force(ent.kind_of(e)) for e in everything]
-        work = [*self._fixed, *(ent.build(e) for e, adds in zip(everything, adding, strict=True) if not adds)]
+        built = [ent.build(e) for e, adds in zip(everything, adding, strict=True) if not adds]
+        work = exact([*self._fixed, *built], self.data.held)
         # What effects other than friction's bring along is made with the columns.
         changing = [e for e in work if e.place is Place.FRICTION]
         return everything, adding, [*work, *(brought for e in changing for brought in e.companions())]
@@ -292,14 +294,14 @@ class ForceBalance(Signals):
 
         Both below the bandwidth in which the motion stands above the sensor's noise.
         """
-        sensors = [e for e in stage.chain if e.place is Place.SENSOR]
-        chain = [e for e in stage.chain if e.place is Place.DRIVE]
+        whole = exact(stage.chain, self.data.held)
+        sensors, chain = ([e for e in whole if e.place is p] for p in (Place.SENSOR, Place.DRIVE))
         given, needed = [], []
         for s, p in zip(self.data.segments, self.paths(sensors), strict=True):
             held = self.given(s)
             parts = parts_of_drive(chain) if self.data.held else 1
             over = forces(stage, chain, s.time, p.x, p.v, p.a, held, parts=parts)
-            f = forces(stage, stage.chain, s.time, p.x, p.v, p.a, held, self.grain)
+            f = forces(stage, whole, s.time, p.x, p.v, p.a, held, self.grain)
             given.append(over.held_drive() if self.data.held else around_rows(over.drive))
             needed.append(f.mass * p.measured - f.others())
         return self.smooth(given), self.smooth(needed)

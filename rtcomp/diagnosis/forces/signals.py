@@ -20,6 +20,7 @@ from rtcomp.diagnosis.forces.led import led_there, way_there
 from rtcomp.diagnosis.forces.noise import Noise
 from rtcomp.diagnosis.forces.play import Carried, Load, behind_play
 from rtcomp.diagnosis.forces.reaches import grid
+from rtcomp.diagnosis.forces.sides import exact
 from rtcomp.diagnosis.numerics.spectrum import filtered
 from rtcomp.diagnosis.recordings.data import Data, Segment, behind_reading
 from rtcomp.kernels import Floats
@@ -57,7 +58,7 @@ class Signals:
         believed = [dict(e) for e in stage.mechanics.effects]
         self.believed = [e for e in believed if _refitted(e)]
         """Entries of the belief that add a force: their sizes are refitted with the base."""
-        self._fixed = [ent.build(e) for e in believed if not _refitted(e)]
+        self._fixed = exact((ent.build(e) for e in believed if not _refitted(e)), data.held)
         friction = stage.friction
         self._elements = list(friction.elements) if isinstance(friction, MaxwellSlip) else []
         self._cache = Cache()
@@ -188,8 +189,8 @@ class Signals:
         own = (weights.tobytes(), larger) if weights is not None and whole else ()
         before: list[Effect] = []
         if any(e.values.get("external") is not None for e in modifiers):
-            chain = [e for e in self.stage.chain if e.place is Place.DRIVE]
-            before = [*chain, *[e for e in drive if e not in chain]]
+            chain = [e for e in exact(self.stage.chain, self.data.held) if e.place is Place.DRIVE]
+            before = [*chain, *(e for e in drive if e not in chain)]
             if any(e.values.get("external") for e in modifiers):
                 before += [e for e in adding if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
         behind = carried.key if carried is not None else ()
