@@ -41,7 +41,7 @@ by MOVED only, speed by VELOCITY less LATE, its level by REACH, its size by SCAL
 
 What a search for a missing effect needs to know stands here too, and nowhere by name: `linear` parameters,
 `neutral` values, `searchable`, `search_grid`, `whole_friction`, `moving_mass`, `behind`, `steady`,
-`command_only`, `bias`, `stands_for`, `other_unit`,
+`command_only`, `bias`, `known_law`, `stands_for`, `other_unit`,
 `Parameter.physical_low` and `Parameter.held`. Each has its sentence at `Effect`; the defaults do for most.
 
 To feed an effect forward, there are two ways, and its place says which:
@@ -186,6 +186,8 @@ class Effect:
     """Of the drive, where it remembers: whether what it gives over a step is the mean over that step."""
     bias: ClassVar[bool] = False
     """Whether it is a constant force on a linear axis."""
+    known_law: ClassVar[bool] = False
+    """Whether physics leaves it no other form, as of a weight: what it does not explain is something else."""
     stands_for: ClassVar[str] = ""
     """Key of the stage file's section ``stage`` that it is another way to write, "" for none: a fit moves
     that number instead."""

@@ -115,6 +115,7 @@ class Gravity(Effect):
     neutral = {"force": 0.0, "amplitude": 0.0}
     linear = ("force", "amplitude")
     bias = True
+    known_law = True
 
     def __init__(self, **values: Any) -> None:
         super().__init__(**values)

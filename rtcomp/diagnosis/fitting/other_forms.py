@@ -41,8 +41,10 @@ is biased."""
 
 
 def other_forms(fitter: Fitter, model: Fitted, at: int) -> Floats:
-    """Return the columns (q, n) of what other forms of a model's effect number `at` do."""
+    """Return the columns (q, n) of what other forms of a model's effect number `at` do, if it has any."""
     entry = model.entries[at]
+    if ent.kind_of(entry).known_law:
+        return np.zeros((0, model.residual.size))
     bent = _bent(fitter.balance, entry, force_of(fitter, model, at))
     return np.concatenate([bent, overtones(fitter, model, entry)])
 
@@ -133,7 +135,8 @@ def other_beliefs(balance: ForceBalance, model: Fitted, besides: str) -> Floats:
     """
     found = [np.zeros((0, model.residual.size))]
     for entry, span in zip(balance.believed, model.system.of_entry, strict=False):
-        if entry["name"] != besides and span.stop > span.start:
+        bends = entry["name"] != besides and not ent.kind_of(entry).known_law
+        if bends and span.stop > span.start:
             found.append(of_position(balance, ent.composed(entry, model.coefficients[span])))
     return np.concatenate(found)
 

@@ -161,6 +161,23 @@ def test_a_constant_has_no_other_form(entry: dict[str, Any]) -> None:
     assert not Fitter(believed).other_forms(baseline(believed), "parallel-spring").size
 
 
+@pytest.mark.parametrize(
+    ("entry", "bends"),
+    [
+        ({"name": "parallel-spring", "stiffness": 3000.0}, True),
+        ({"name": "gravity", "amplitude": 1e4, "phase": 0.2}, False),
+    ],
+)
+def test_a_believed_spring_may_bend_and_a_weight_may_not(entry: dict[str, Any], bends: bool) -> None:
+    """A constant moment beside the believed weight of a joint is no other form of that weight."""
+    believed = stage(axis="rotary", effects=[entry])
+    balance = ForceBalance(believed, load_data([run(believed, there_and_back(12.0))]))
+    base, fitter = baseline(balance), Fitter(balance)
+    assert bool(fitter.other_forms(base, "").size) is bends
+    held = fitter.fit([Term.of({**entry, "amplitude" if "amplitude" in entry else "stiffness": 1.0})])
+    assert bool(fitter.forms_of(held, 0).size) is bends
+
+
 def test_other_forms_beside_a_model_do_not_make_it_a_poorer_one() -> None:
     """What is fitted to noise predicts blocks left out worse: no further effect is better for that."""
     believed = stage()
