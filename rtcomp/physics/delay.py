@@ -4,8 +4,8 @@ Both keep a ring of what came in with its times, HELD entries deep: at the tick 
 HELD / f, a second at 1 kHz. Of a longer one the oldest entry is used, which makes it as short as that.
 
 In a force balance on recorded rows the drive's delay needs nothing more than its kernel, which gives the mean
-over a row. A late reading cannot be undone by a kernel, which sees no future: the recorded position is shifted
-by `delay`. Of a command and a reading that lie beside each other nothing tells which of the two is late.
+over a row. A late reading cannot be undone by a kernel, which sees no future: the recorded position is
+shifted by `delay`. Of a command beside a reading nothing tells which of the two is late.
 """
 
 from __future__ import annotations

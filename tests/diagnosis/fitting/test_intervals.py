@@ -63,7 +63,7 @@ def test_a_number_below_what_a_recording_can_show_is_told_to_be_at_its_bound(
 
 
 def test_what_replicates_are_off_by_is_part_of_an_interval() -> None:
-    """It was taken off, and is known to its own size; without replicates a part of the force stands for it."""
+    """It was taken off, and is known to its own size; without replicates a part of the force counts."""
     spring = {"name": "parallel-spring", "stiffness": 3000.0}
     believed = stage()
     balance = ForceBalance(believed, load_data([run(stage(effects=[spring]), there_and_back())]))
