@@ -58,14 +58,17 @@ class Kernel:
         self._signature = signature
         self._pointers = pointers
         self._compiled: Any = None
+        self._address = 0
 
     @property
     def address(self) -> int:
         """The address to hand to `call_effect`, `call_basis` or `call_learner`."""
-        with _COMPILING:  # what another thread's address leads to must not be compiled anew
-            if self._compiled is None:
-                self._compiled = cfunc(self._signature, cache=True)(self.python)
-        return int(self._compiled.address)
+        if self._address == 0:
+            with _COMPILING:  # what another thread's address leads to must not be compiled anew
+                if self._compiled is None:
+                    self._compiled = cfunc(self._signature, cache=True)(self.python)
+                self._address = int(self._compiled.address)
+        return self._address
 
     def __call__(self, *arguments: Any) -> None:
         """Call the compiled kernel from Python: float64 arrays first, then numbers."""

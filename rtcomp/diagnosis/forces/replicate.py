@@ -1,8 +1,8 @@
 """Bootstrap replicates: the current model simulated along the recorded motion, read by the believed sensor.
 
 The recorded command drives the simulation and a feedback keeps it on the recorded motion: the stage's own
-controller, or one that its mass asks for. So recordings with and without a reference, of known and unknown
-controllers, are replicated alike.
+controller as loud as it was recorded, or one that its mass asks for. So recordings with and without a
+reference, of known and unknown controllers, are replicated alike.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rtcomp.control.pid import pid_preset, pid_state, pid_step, pid_vector
+from rtcomp.diagnosis.forces.controller import gains
 from rtcomp.diagnosis.recordings.data import Data, Segment, averaged
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics import Place, wires
@@ -77,12 +78,9 @@ def followed(stage: Stage, path: Floats, rate: float) -> tuple[Floats, Floats]:
     return _simulated(stage, Data((segment,), rate, True), segment, path, np.random.default_rng(0))
 
 
-def _gains(stage: Stage, period: float, rate: float) -> Floats:
-    controller = stage.controller
-    if controller is not None:
-        return pid_vector(
-            controller.kp, controller.ki, controller.kd, period=period, voltage_limit=stage.voltage_limit
-        )
+def _gains(stage: Stage, period: float, rate: float, segment: Segment) -> Floats:
+    if stage.controller is not None:
+        return gains(stage, period, segment if segment.voltage.any() else None)
     omega = 2.0 * math.pi * BANDWIDTH * rate
     kp = stage.mass * omega**2 / stage.force_constant
     kd = 2.0 * stage.mass * omega / stage.force_constant
@@ -114,13 +112,13 @@ def _simulated(
     w[wires.POSITION] = motion[0]
     w[wires.TIME] = segment.time[0]
     w[wires.REACH] = w[wires.SCALE] = 1.0
-    gains, state = _gains(stage, period, data.rate), pid_state()
+    pid, state = _gains(stage, period, data.rate, segment), pid_state()
     pid_preset(
-        gains, state, float(target[0] - motion[0]), float(motion[0]), float(segment.voltage[0] - command[0])
+        pid, state, float(target[0] - motion[0]), float(motion[0]), float(segment.voltage[0] - command[0])
     )
     out = np.empty((2, target.size))
     _loop(
-        moving.steps, moving.p, moving.s, sensing.steps, sensing.p, sensing.s, w, base, gains, state, target,
+        moving.steps, moving.p, moving.s, sensing.steps, sensing.p, sensing.s, w, base, pid, state, target,
         command, random.standard_normal(target.size), finer == 1, stage.voltage_limit, period, steps, out,
     )  # fmt: skip
     volts = out[1]
