@@ -21,6 +21,7 @@ from rtcomp.diagnosis.fitting.other_forms import any_laws, errors_beside, in_any
 from rtcomp.diagnosis.numerics.significance import confidence_set, log_gain, probabilities
 from rtcomp.diagnosis.search.replicates import best
 from rtcomp.diagnosis.search.selection import Search
+from rtcomp.diagnosis.search.separate import separate
 from rtcomp.diagnosis.settings import ALIAS, LEVEL
 from rtcomp.kernels import Floats
 
@@ -70,6 +71,7 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         alike = set(confidence_set(errors, SET_LEVEL))
         least = (1.0 - ALIAS) * log_gain(rest.errors, chosen.errors)
         members = alike | {0} | {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
+        members |= _like(fitter, found, models, set(range(len(models))) - members, ends)
         members -= {k for k in members if k and explains_another(fitter, chosen, rest, models[k], ends)}
         if 0 in alike:
             plainer = min(members, key=lambda k: (models[k].size, -weight[k]))
@@ -100,6 +102,14 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
             )
         )
     return done
+
+
+def _like(fitter: Fitter, found: Search, models: Sequence[Fitted], others: set[int], ends: float) -> set[int]:
+    """Return those of `others`, by number, that leave no more than noise and may have made this recording."""
+    if found.null is None:
+        return set()
+    noisy = {k for k in others if found.null.p_of_error(models[k].errors) >= LEVEL}
+    return {k for k in noisy if not separate(fitter, models[0], models[k], SET_LEVEL, ends)}
 
 
 def _by_cell(fitter: Fitter, model: Fitted) -> Floats:
@@ -187,10 +197,19 @@ def _others(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -
         for m in found.alternatives
         if sorted(ent.names(m.entries)[:-1]) == kept and m.terms[-1].entry["name"] != name and not m.at_bound
     ]
-    if known or clock.now() > ends:
+    if not known and clock.now() < ends:
+        known = _looked_up(fitter, found, at, rest, ends)
+    twin = ent.build(chosen.terms[at].entry).elsewhere()
+    if twin is None or not fitter.by_force or any(m.terms[-1].entry["name"] == twin.name for m in known):
         return known
+    return [*known, *fitted_in_time(fitter, rest, [Term.of({"name": twin.name, **twin.values})], math.inf)]
+
+
+def _looked_up(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -> list[Fitted]:
+    """Return models with the best of all candidates in the place of one of the chosen effects."""
+    chosen, name = found.chosen, str(found.chosen.terms[at].entry["name"])
     beside = (found.beside or ()) if fitter.by_force else ()
-    seen = look(fitter, rest, known=beside, without=[str(name)])
+    seen = look(fitter, rest, known=beside, without=[name])
     made, screened = seen.candidates, seen.screened
     least = NEAR * log_gain(rest.errors, chosen.errors)
     tried = [
