@@ -44,7 +44,7 @@ def replicate(stage: Stage, data: Data, motion: list[Floats], noise: float, seed
     """
     random = np.random.default_rng(seed)
     low, high = data.stroke
-    counts = stage.sensor.resolution or data.count
+    counts = stage.sensor.resolution
     recorded = data.as_recorded()
     rest = max(math.sqrt(max(noise**2 - counts**2 / 12.0, 0.0)), DITHER * counts)
     stage = stage.with_changes(sensor={"noise": rest, "resolution": counts})

@@ -145,11 +145,6 @@ class Signals:
             v = filtered(v, rate, self.noise.smoother)
         return Path(slow, v, second_difference(slow, rate), measured)
 
-    @property
-    def count(self) -> float:
-        """The sensor's count (m): as the stage states it, else as the readings show it; 0.0 for none."""
-        return self.stage.sensor.resolution or self.data.count
-
     def given(self, segment: Segment) -> Floats:
         """Return the command (V, (K,)) that acts up to each row."""
         u = segment.voltage

@@ -29,7 +29,7 @@ def trust(balance: ForceBalance) -> Floats:
     weighted least squares. It followed the drive's force, up or down, by as much as that went up and down in
     a stretch of rest, or by all that friction can do.
     """
-    if balance.count == 0.0:
+    if balance.stage.sensor.resolution == 0.0:
         return np.ones(balance.plain([s.time for s in balance.data.segments]).size)
     random = np.random.default_rng(7)
     unseen = [
@@ -54,7 +54,7 @@ def _drive_of(balance: ForceBalance, voltage: Floats) -> Floats:
 
 def _unseen(balance: ForceBalance) -> list[tuple[Floats, np.ndarray]]:
     """Return `courses` of each segment, as far as friction is known to go."""
-    width, read = COUNTS * balance.count, balance.data.segments
+    width, read = COUNTS * balance.stage.sensor.resolution, balance.data.segments
     return [courses(s.position, _drive_of(balance, s.voltage), width, balance.level) for s in read]
 
 

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from rtcomp.diagnosis.recordings.counts import count_of
 from rtcomp.diagnosis.recordings.jumps import MOST, Jump, jumps
 from rtcomp.diagnosis.recordings.stretches import LEAST_ROWS, stretches
 from rtcomp.kernels import Floats
@@ -94,11 +93,6 @@ class Data:
         """The clearest steps of the reading that are unlike those before and after them."""
         found = [j for s in self.as_recorded().segments for j in jumps(s.time, s.position)]
         return sorted(found, key=lambda j: -j.clear)[:MOST]
-
-    @cached_property
-    def count(self) -> float:
-        """The sensor's count (m) as the readings show it, 0.0 where they do not."""
-        return count_of([s.position for s in self.as_recorded().segments])
 
     def as_recorded(self) -> Data:
         """Return the rows that these are means of."""
