@@ -265,28 +265,6 @@ def test_a_large_trial_hides_every_effect_in_the_parts_promised() -> None:
 
 
 @pytest.mark.slow
-def test_prove(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A small trial of the program itself over all families: its seal holds, its scores are shown.
-
-    The budget is one that a busy machine does not use up: the answers do not depend on its load.
-    """
-    out = tmp_path / "trial"
-    patient = f"{sys.executable} -m rtcomp diagnose --budget 200"
-    more = ("--cases", 8, "--seed", 11, "--diagnose", patient)
-    run = trial(out, *more, timeout=3000.0)
-    with capsys.disabled():
-        print(f"\n{run.stdout}{run.stderr}")
-    assert run.returncode == 0
-    content = checked(out, 8)
-    figures = {f["name"]: f for f in content["figures"]}
-    assert figures["right, all cases"]["count"] == 8
-    assert figures["diagnosis failed"]["value"] == 0.0
-    assert figures["made worse"]["count"] == 8 and figures["made worse"]["value"] <= 1 / 8
-    assert figures["false alarm on clean"]["value"] == 0.0
-    assert figures["right, all cases"]["value"] >= 0.6
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("rival", ["frols", "sindy"])
 def test_rivals_name_a_strong_plain_effect(rival: str, tmp_path: Path) -> None:
     pytest.importorskip({"frols": "sysidentpy", "sindy": "pysindy"}[rival])
