@@ -64,7 +64,7 @@ class Kernel:
     def address(self) -> int:
         """The address to hand to `call_effect`, `call_basis` or `call_learner`."""
         if self._address == 0:
-            with _COMPILING:  # what another thread's address leads to must not be compiled anew
+            with _COMPILING:  # two threads that ask at once must get the same code
                 if self._compiled is None:
                     self._compiled = cfunc(self._signature, cache=True)(self.python)
                 self._address = int(self._compiled.address)

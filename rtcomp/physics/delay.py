@@ -5,7 +5,7 @@ HELD / f, a second at 1 kHz. Of a longer one the oldest entry is used, which mak
 
 In a force balance on recorded rows the drive's delay needs nothing more than its kernel, which gives the mean
 over a row. A late reading cannot be undone by a kernel, which sees no future: the recorded position is
-shifted by `delay`. Of a command beside a reading nothing tells which of the two is late.
+shifted by `delay`. No recording tells which of the two is late.
 """
 
 from __future__ import annotations
@@ -121,8 +121,8 @@ class DriveDelay(Effect):
     order = 20
     states = _RING + 2 * HELD
 
-    def elsewhere(self) -> Effect:
-        """A reading as late."""
+    def equivalent(self) -> Effect:
+        """Return a reading that is as late."""
         return SensorDelay(**self.values)
 
 
@@ -145,6 +145,6 @@ class SensorDelay(Effect):
     order = 10
     states = _RING + 2 * HELD
 
-    def elsewhere(self) -> Effect:
-        """A command as late."""
+    def equivalent(self) -> Effect:
+        """Return a command that is as late."""
         return DriveDelay(**self.values)

@@ -278,9 +278,11 @@ class Effect:
         """Effects that it needs elsewhere in the chain and that no stage lists."""
         return []
 
-    def elsewhere(self) -> Effect | None:
-        """The effect of the drive or the sensor that puts the same command beside the same reading as this
-        one of the other; None where none does."""
+    def equivalent(self) -> Effect | None:
+        """Return the effect of the sensor that no recording tells from this one of the drive, or the reverse.
+
+        None where there is none: most effects.
+        """
         return None
 
     def to_dict(self) -> dict[str, Any]:

@@ -6,43 +6,46 @@ so a replicate needs it, and the command that was recorded beside reading and re
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 
-from rtcomp.control.pid import INTEGRAL_LIMIT, STATES, Derivative, pid_preset, pid_step, pid_vector
+from rtcomp.control.pid import INTEGRAL_LIMIT, POLE, STATES, Derivative, pid_preset, pid_step, pid_vector
+from rtcomp.diagnosis.forces.readings import EXCERPT
 from rtcomp.diagnosis.recordings.data import Segment
 from rtcomp.kernels import Floats, compiled
 from rtcomp.stage.stage import Stage
 
-FILTERS = (2.0, 0.0, 0.5, 1.0, 4.0, 8.0, 16.0)
-"""Time constants of the filter, in periods; the first is that of our own loop."""
-ROWS = 20_000
-"""Rows that are looked at, at most."""
 INPUTS: tuple[Derivative, ...] = ("error", "measurement")
 """What the derivative is of."""
 
 
 def gains(stage: Stage, period: float, segment: Segment | None = None) -> Floats:
-    """Return the parameters of `pid_step` for a stage with a controller, as near to a segment's command."""
+    """Return the parameters of `pid_step` for a stage with a controller.
+
+    The filter of the derivative, and whether that is of the error or the reading, are those that come nearest
+    to the command of a `segment`; without one, those of our own loop.
+    """
+    from scipy.optimize import minimize_scalar
+
     c = stage.controller
     assert c is not None
 
-    def made(of: Derivative, filtering: float) -> Floats:
-        return pid_vector(
-            c.kp, c.ki, c.kd, period=period, derivative=of, derivative_time=filtering * period,
-            voltage_limit=stage.voltage_limit,
-        )  # fmt: skip
+    def made(of: Derivative) -> Floats:
+        limit = stage.voltage_limit
+        return pid_vector(c.kp, c.ki, c.kd, period=period, derivative=of, voltage_limit=limit)
 
-    plain = made(INPUTS[0], FILTERS[0])
     if segment is None or segment.reference is None or c.kd == 0.0:
-        return plain
-    target, read, volts = (a[:ROWS] for a in (segment.reference, segment.position, segment.voltage))
+        return made(INPUTS[0])
+    target, read, volts = (a[:EXCERPT] for a in (segment.reference, segment.position, segment.voltage))
 
-    def apart(one: Floats) -> float:
+    def apart(pole: float, one: Floats) -> float:
+        one[POLE] = pole
         return float(np.var(np.diff(_commanded(one, target, read, float(volts[0])) - volts)))
 
-    return min((made(of, filtering) for of, filtering in product(INPUTS, FILTERS)), key=apart)
+    found = []
+    for one in map(made, INPUTS):
+        best = minimize_scalar(apart, bounds=(0.0, 1.0), args=(one,), method="bounded")
+        found.append((apart(best.x, one), one))
+    return min(found, key=lambda each: each[0])[1]
 
 
 @compiled

@@ -71,7 +71,7 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         alike = set(confidence_set(errors, SET_LEVEL))
         least = (1.0 - ALIAS) * log_gain(rest.errors, chosen.errors)
         members = alike | {0} | {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
-        members |= _like(fitter, found, models, set(range(len(models))) - members, ends)
+        members |= _not_separate(fitter, found, models, set(range(len(models))) - members, ends)
         members -= {k for k in members if k and explains_another(fitter, chosen, rest, models[k], ends)}
         if 0 in alike:
             plainer = min(members, key=lambda k: (models[k].size, -weight[k]))
@@ -104,7 +104,9 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
     return done
 
 
-def _like(fitter: Fitter, found: Search, models: Sequence[Fitted], others: set[int], ends: float) -> set[int]:
+def _not_separate(
+    fitter: Fitter, found: Search, models: Sequence[Fitted], others: set[int], ends: float
+) -> set[int]:
     """Return those of `others`, by number, that leave no more than noise and may have made this recording."""
     if found.null is None:
         return set()
@@ -199,10 +201,10 @@ def _others(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -
     ]
     if not known and clock.now() < ends:
         known = _looked_up(fitter, found, at, rest, ends)
-    twin = ent.build(chosen.terms[at].entry).elsewhere()
-    if twin is None or not fitter.by_force or any(m.terms[-1].entry["name"] == twin.name for m in known):
+    same = ent.build(chosen.terms[at].entry).equivalent()
+    if same is None or not fitter.by_force or any(m.terms[-1].entry["name"] == same.name for m in known):
         return known
-    return [*known, *fitted_in_time(fitter, rest, [Term.of({"name": twin.name, **twin.values})], math.inf)]
+    return [*known, *fitted_in_time(fitter, rest, [Term.of({"name": same.name, **same.values})], math.inf)]
 
 
 def _looked_up(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -> list[Fitted]:

@@ -1,8 +1,8 @@
-"""Whether a recording tells two models apart: would one of the other's look as it does?
+"""Whether a recording tells two models apart: is the better fit more than recordings of the other show?
 
-Errors that a sensor's counts make are no chance: block by block they favour the same model. So recordings of
-the other model are simulated, and both are fitted to each (tests of separate families: Cox 1961, Proc. 4th
-Berkeley Symposium 1; by simulation: Williams 1970, Biometrics 26(1)).
+Errors that a sensor's counts make are not random: they favour the same model in every block. So recordings of
+the other model are simulated, and both models are fitted to each (tests of separate families: Cox 1961,
+Proc. 4th Berkeley Symposium 1; by simulation: Williams 1970, Biometrics 26(1)).
 """
 
 from __future__ import annotations
@@ -17,16 +17,14 @@ from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.forces.replicate import left_by
 from rtcomp.diagnosis.numerics.significance import log_gain
+from rtcomp.diagnosis.search.replicates import FEW
 from rtcomp.errors import ConfigError
-
-RECORDINGS = 6
-"""Recordings of the other model that are simulated."""
 
 
 def separate(fitter: Fitter, chosen: Fitted, other: Fitted, level: float, ends: float = math.inf) -> bool:
     """Tell whether the chosen model is better than another by more than on recordings of that, at `level`.
 
-    So it is told where there are no such recordings, or no time for them.
+    True where such recordings cannot be made, or not before the time `ends`.
     """
     from scipy.special import stdtrit
 
@@ -46,7 +44,7 @@ def separate(fitter: Fitter, chosen: Fitted, other: Fitted, level: float, ends: 
             return math.nan
         return log_gain(fits[0].errors, fits[1].errors)
 
-    better = np.array(shared(one, range(RECORDINGS)))
+    better = np.array(shared(one, range(FEW)))
     better = better[np.isfinite(better)]
     if better.size < 2:
         return True

@@ -19,16 +19,16 @@ from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.physics import Effect, catalogue
 
 KINDS = list(catalogue.entries())
-LATE = [k for k in KINDS if k.from_dict(k.example).elsewhere() is not None]
+LATE = [k for k in KINDS if k.from_dict(k.example).equivalent() is not None]
 ROWS = 1.8
 
 
 @pytest.mark.parametrize("kind", LATE, ids=lambda k: str(k.name))
 def test_what_an_effect_is_at_the_other_side_is_itself_from_there(kind: type[Effect]) -> None:
     one = kind.from_dict(kind.example)
-    other = one.elsewhere()
+    other = one.equivalent()
     assert other is not None and other.place is not one.place
-    assert other.elsewhere() == one
+    assert other.equivalent() == one
 
 
 @given(st.permutations(KINDS), st.booleans())
