@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -22,7 +24,7 @@ ANSWERED = 12.0
 ANSWER = 4
 """Rows for which a controller is taken to answer a step."""
 LAW = 5
-"""Newest readings that a command is taken to answer at once, in proportion."""
+"""Newest values of each input that a command is taken to answer at once, in proportion."""
 USUALLY = 0.999
 """Quantile of what is sudden in a command, beyond which wrong samples may bend the answer."""
 LAWFUL = 0.25
@@ -65,65 +67,69 @@ def _returned(signal: Floats, found: npt.NDArray[np.bool_]) -> npt.NDArray[np.bo
     return found
 
 
-def answers(position: Floats) -> npt.NDArray[np.bool_]:
-    """Return the rows at which a controller answers a step of the `position` reading, which is no outlier.
+def answers(signal: Floats) -> npt.NDArray[np.bool_]:
+    """Return the rows at which a controller answers a step of a `signal`: a reading, which is no outlier.
 
     A step is a difference of readings that is unlike its neighbours by more than ANSWERED robust standard
     deviations.
     """
-    step = np.diff(position, prepend=position[0])
+    step = np.diff(signal, prepend=signal[0])
     off = np.zeros_like(step)
     off[2:-2] = np.abs(step[2:-2] - 0.25 * (step[:-4] + step[1:-3] + step[3:-1] + step[4:]))
     parts = sample(off)
     usual = 1.4826 * float(np.median(np.concatenate(parts)))
-    stepped = off > ANSWERED * max(usual, _resolution(sample(position)))
+    stepped = off > ANSWERED * max(usual, _resolution(sample(signal)))
     found = stepped.copy()
     for late in range(1, ANSWER + 1):
         found[late:] |= stepped[:-late]
     return found
 
 
-def lawful(command: Floats, position: Floats, marked: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Return those of the `marked` rows whose `command` is what a linear controller made of the readings.
+def lawful(command: Floats, inputs: Sequence[Floats], marked: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Return those of the `marked` rows whose `command` is what a linear controller made of its `inputs`.
 
-    A controller that differentiates a coarse encoder kicks at every count: these commands were really given.
-    What is sudden in the command is regressed on what is sudden in the last LAW readings, over the whole
-    recording; a row that this explains is no outlier.
+    A controller that differentiates kicks at every count of a coarse encoder, and at every step of its
+    reference: these commands were really given. What is sudden in the command is regressed on what is sudden
+    in the last LAW values of each input, over the whole recording; a row that this explains is no outlier.
     """
     if len(command) < SPREAD_WINDOW:
         return np.zeros_like(marked)
     # A few wrong samples may bend the law until it explains nothing: once with the largest cut off, then
     # once more without what the better law does not explain.
     nothing = np.zeros_like(marked)
-    laws = [_law(command, position, nothing, most) for most in (1.0, USUALLY)]
-    found = max((_explained(command, position, marked, law) for law in laws), key=np.count_nonzero)
+    laws = [_law(command, inputs, nothing, most) for most in (1.0, USUALLY)]
+    found = max((_explained(command, inputs, marked, law) for law in laws), key=np.count_nonzero)
     if (found == marked).all():
         return found
     beside = np.zeros_like(marked)
     for away in range(-LAW, LAW + 1):
         beside[np.clip(np.flatnonzero(marked & ~found) + away, 0, len(marked) - 1)] = True
-    again = _explained(command, position, marked, _law(command, position, beside))
+    again = _explained(command, inputs, marked, _law(command, inputs, beside))
     return max(found, again, key=np.count_nonzero)
 
 
-def _law(command: Floats, position: Floats, without: npt.NDArray[np.bool_], most: float = 1.0) -> Floats:
-    """Return how a command answers the newest LAW readings, fitted to all rows but those `without`.
+def _law(
+    command: Floats, inputs: Sequence[Floats], without: npt.NDArray[np.bool_], most: float = 1.0
+) -> Floats:
+    """Return how a command answers the newest LAW values of inputs, fitted to all rows but those `without`.
 
     What is sudden in the command is cut off at its quantile `most`.
     """
-    gram, with_command = np.zeros((LAW, LAW)), np.zeros(LAW)
+    count = LAW * len(inputs)
+    gram, with_command = np.zeros((count, count)), np.zeros(count)
     sudden = [_sudden(volts) for volts in sample(command)]
     limit = float(np.quantile(np.abs(np.concatenate(sudden)), most))
-    for rows, volts, left_out in zip(sample(position), sudden, sample(without), strict=True):
-        at = np.flatnonzero(~left_out[LAW : len(rows) - LAW]) + LAW
-        readings = _readings(_sudden(rows), at)
-        gram += readings.T @ readings
-        with_command += readings.T @ np.clip(volts[at], -limit, limit)
+    rows = zip(*(sample(one) for one in inputs), strict=True)
+    for read, volts, left_out in zip(rows, sudden, sample(without), strict=True):
+        at = np.flatnonzero(~left_out[LAW : len(volts) - LAW]) + LAW
+        newest = _newest([_sudden(one) for one in read], at)
+        gram += newest.T @ newest
+        with_command += newest.T @ np.clip(volts[at], -limit, limit)
     return np.asarray(np.linalg.lstsq(gram, with_command, rcond=1e-12)[0])
 
 
 def _explained(
-    command: Floats, position: Floats, marked: npt.NDArray[np.bool_], law: Floats
+    command: Floats, inputs: Sequence[Floats], marked: npt.NDArray[np.bool_], law: Floats
 ) -> npt.NDArray[np.bool_]:
     """Return those of the `marked` rows of which `law` leaves little."""
     found = np.zeros_like(marked)
@@ -135,14 +141,15 @@ def _explained(
         near = slice(begin, piece.stop + REACH)
         at += piece.start - begin
         sudden = _sudden(command[near])[at]
-        left = np.abs(sudden - _readings(_sudden(position[near]), at) @ law)
+        left = np.abs(sudden - _newest([_sudden(one[near]) for one in inputs], at) @ law)
         found[at + begin] = left < LAWFUL * np.abs(sudden)
     return found
 
 
-def _readings(sudden: Floats, at: npt.NDArray[np.intp]) -> Floats:
-    """Return of the rows `at` the newest LAW values of `sudden`, (rows, LAW)."""
-    return np.asarray(sudden[np.maximum(at[:, np.newaxis] - np.arange(LAW), 0)])
+def _newest(inputs: Sequence[Floats], at: npt.NDArray[np.intp]) -> Floats:
+    """Return of the rows `at` the newest LAW values of each input, (rows, LAW inputs)."""
+    rows = np.maximum(at[:, np.newaxis] - np.arange(LAW), 0)
+    return np.hstack([one[rows] for one in inputs])
 
 
 def _sudden(signal: Floats) -> Floats:

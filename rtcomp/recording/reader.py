@@ -299,8 +299,10 @@ def _marked(columns: Mapping[str, Floats], notes: list[str]) -> npt.NDArray[np.b
         if name in columns:
             found = outliers(columns[name], threshold)
             if name == "voltage" and found.any():
-                found &= ~answers(columns["position"])
-                found &= ~lawful(columns["voltage"], columns["position"], found)
+                inputs = [columns[one] for one in ("position", "reference") if one in columns]
+                for one in inputs:
+                    found &= ~answers(one)
+                found &= ~lawful(columns["voltage"], inputs, found)
             marked |= found
             if found.any():
                 at = columns["time"][int(np.argmax(found))]

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from recording_files import motion, write_hdf5
+from scipy.signal import lfilter
 
 from rtcomp.recording.outliers import COMMAND_THRESHOLD, lawful, outliers
 from rtcomp.recording.reader import read
@@ -67,11 +68,11 @@ def test_kicks_of_a_controller_at_counts_of_its_sensor_are_no_outliers(
 ) -> None:
     columns = driven(gains, count, rate)
     found = outliers(columns["voltage"], COMMAND_THRESHOLD)
-    assert not (found & ~lawful(columns["voltage"], columns["position"], found)).any()
+    assert not (found & ~lawful(columns["voltage"], [columns["position"]], found)).any()
     wrong = columns["voltage"].copy()
     wrong[row] += 20.0 * np.ptp(wrong)
     found = outliers(wrong, COMMAND_THRESHOLD)
-    left = np.flatnonzero(found & ~lawful(wrong, columns["position"], found))
+    left = np.flatnonzero(found & ~lawful(wrong, [columns["position"]], found))
     assert row in left and np.all(np.abs(left - row) <= 2)  # a kick beside it looks as wrong
 
 
@@ -81,12 +82,34 @@ def test_the_recording_keeps_them(tmp_path: Path) -> None:
     assert "outlier" not in read(write_hdf5(tmp_path / "a.h5", columns)).columns
 
 
+@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.floats(1e-5, 1e-3), st.floats(0.5, 1.0), st.integers(1000, 3000))
+def test_kicks_of_a_controller_at_steps_of_its_reference_are_no_outliers(
+    tmp_path: Path, size: float, pole: float, row: int
+) -> None:
+    """The derivative of a stepped reference is in the command for a row or a few, and was really given."""
+    time = np.arange(4000) / 1000.0
+    reference = size * np.sin(3.0 * time)
+    for at in range(150, 4000, 400):
+        reference[at:] += 0.3 * size
+    position = lfilter([0.02], [1.0, -0.98], reference)
+    error = reference - position
+    rate = lfilter([pole], [1.0, pole - 1.0], np.diff(error, prepend=error[0])) * 1000.0
+    columns = {"time": time, "reference": reference, "position": position}
+    columns["voltage"] = (0.5 * error + 0.02 * rate) / size
+    assert outliers(columns["voltage"], COMMAND_THRESHOLD).any()
+    assert "outlier" not in read(write_hdf5(tmp_path / "a.h5", columns)).columns
+    columns["voltage"][row] += 20.0 * np.ptp(columns["voltage"])
+    left = np.flatnonzero(read(write_hdf5(tmp_path / "b.h5", columns)).columns["outlier"])
+    assert row in left
+
+
 def test_a_long_recording_is_looked_at_piece_by_piece(monkeypatch: pytest.MonkeyPatch) -> None:
     columns = driven((3e3, 2e4, 23.0), 1e-6, 1000.0)
     wrong = columns["voltage"].copy()
     wrong[[500, 1023, 1024, 3990]] += 20.0 * np.ptp(wrong)
     found = outliers(wrong, COMMAND_THRESHOLD)
-    whole = lawful(wrong, columns["position"], found)
+    whole = lawful(wrong, [columns["position"]], found)
     monkeypatch.setattr("rtcomp.recording.pieces.PIECE", 1024)
-    assert np.array_equal(lawful(wrong, columns["position"], found), whole)
+    assert np.array_equal(lawful(wrong, [columns["position"]], found), whole)
     assert {500, 1023, 1024, 3990} <= set(np.flatnonzero(found & ~whole)) <= {499, 500, 1023, 1024, 3990}
