@@ -47,6 +47,10 @@ COMPILED = "compiling took {:.0f} s, which happens once on a machine and is not 
 LONG = 1.0
 """Time (s) of compiling that is worth a note."""
 BAND_LIMITED = "the command is taken as band-limited between rows, which fits better than held"
+EARLY = (
+    "the command acts {:.2g} ms before its row: what was read belongs to a later time than it says, or a "
+    "simulation moves before it is pushed; that is no physics, and taken so"
+)
 Located = Callable[[float, Sequence[Place]], None]
 """Told, before anything is named, what part of the force the refitted stage leaves open (rms), and where."""
 
@@ -117,6 +121,8 @@ def _diagnosed(
     done = answer(stage, fitter, found, sets, reserved, seed, ends)
     say(1.0, "judge")
     notes = [BAND_LIMITED] if len(objectives) > 1 and not fitter.balance.data.held else []
+    early = fitter.balance.data.early * fitter.balance.data.period
+    notes += [EARLY.format(1e3 * early)] if early else []
     if done.position is not None:
         notes.append(STICKS.format(100.0 * untold(balance), done.position.seconds))
     compiling = clock.compiling() - compiling

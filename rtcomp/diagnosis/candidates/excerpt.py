@@ -10,7 +10,7 @@ from rtcomp.diagnosis.fitting.baseline import yields
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.forces.balance import ForceBalance
-from rtcomp.diagnosis.recordings.data import RUN_IN, Data, Segment, way_to
+from rtcomp.diagnosis.recordings.data import RUN_IN, Segment, way_to
 
 SHARE, FEWEST = 0.15, 2
 """Part of the blocks that are taken, and how many at least."""
@@ -42,7 +42,7 @@ def excerpt(fitter: Fitter, model: Fitted) -> Fitter | None:
                 segments.append(
                     _around(b.whitening.lead, b.whitening.edge, segment, int(own[0]), int(own[-1]))
                 )
-    data = Data(tuple(segments), b.data.rate, b.data.held, b.data.averaged)
+    data = replace(b.data, segments=tuple(segments))
     sizes = [len(range(*b.whitening.rows(s).indices(s.time.size))) for s in segments]
     other = Fitter(b.on(data, np.repeat(np.arange(len(segments)), sizes)))
     other.offset = fitter.offset

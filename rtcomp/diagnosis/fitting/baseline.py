@@ -14,6 +14,7 @@ from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.fitting.timing import put_in_step
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.forces.replicate import left_by
 from rtcomp.diagnosis.forces.signals import FURTHEST
@@ -116,11 +117,11 @@ def with_offset(fitter: Fitter, fitted: Fitted) -> Fitted:
 
 
 def settle(fitter: Fitter, terms: Sequence[Term] = (), ends: float = math.inf) -> None:
-    """Put yield displacements, smoothing and the speed of micro-damping to what a model of `terms` has.
+    """Put yield displacements, smoothing, the speed of micro-damping and timing to what `terms` have.
 
     As far as the time `ends` (clock.now) allows: each is begun only before.
     """
-    for step in (_put_grid, _smooth, partial(_damp, ends=ends)):
+    for step in (_put_grid, _smooth, partial(_damp, ends=ends), put_in_step):
         if fitter.by_force and clock.now() < ends:
             step(fitter, terms)
 

@@ -302,7 +302,8 @@ class ForceBalance(Signals):
             parts = parts_of_drive(chain) if self.data.held else 1
             over = forces(stage, chain, s.time, p.x, p.v, p.a, held, parts=parts)
             f = forces(stage, whole, s.time, p.x, p.v, p.a, held, self.grain)
-            given.append(over.held_drive() if self.data.held else around_rows(over.drive))
+            drive = over.held_drive() if self.data.held else around_rows(over.drive)
+            given.append(self.data.acted(s, drive, stage.force_constant))
             needed.append(f.mass * p.measured - f.others())
         return self.smooth(given), self.smooth(needed)
 

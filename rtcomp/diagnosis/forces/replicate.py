@@ -63,7 +63,7 @@ def replicate(stage: Stage, data: Data, motion: list[Floats], noise: float, seed
         new = replace(segment, position=position, voltage=voltage)  # its friction began there
         new = new if segment is means else averaged(new, data.averaged)
         made.append(replace(new, before=None, run_in=means.run_in))
-    return replace(data, segments=tuple(made))
+    return replace(data, segments=tuple(made), early=0.0)
 
 
 def left_by(stage: Stage, signals: Signals, seed: int = 0) -> Data | None:

@@ -116,6 +116,11 @@ class Signals:
         """Return the noise (m rms) of a recorded reading, of which rows may be means."""
         return self.noise.rms if self.data.averaged == 1 else Noise.of(stage, self.data.as_recorded()).rms
 
+    def act_early(self, rows: float) -> None:
+        """Take a held command to act so many `rows` before its own."""
+        self.data = replace(self.data, early=rows)
+        self._cache = Cache()
+
     def damp_below(self, speed: float) -> None:
         """Take `speed` (m/s) as that below which micro-damping acts."""
         self.stage = self.stage.with_changes(stage={"micro_damping_speed": speed})
@@ -159,7 +164,7 @@ class Signals:
             parts = parts_of_drive(chain) if self.data.held else 1
             f = forces(self.stage, chain, s.time, p.x, p.v, p.a, self.given(s), parts=parts)
             driven = f.held_drive() if self.data.held else around_rows(f.drive)
-            found.append(driven + around_rows(f.push))
+            found.append(self.data.acted(s, driven, self.stage.force_constant) + around_rows(f.push))
         return found
 
     def _base(

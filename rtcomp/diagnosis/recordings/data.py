@@ -46,6 +46,8 @@ class Segment:
     friction remembers, and what swings."""
     run_in: int = 0
     """First rows that are not compared: what lags has no state at the beginning of a window."""
+    finer: Floats | None = None
+    """Where rows are means: what second differences of these see of a command beyond held means (V, (K,))."""
 
     def part(self, rows: slice) -> Segment:
         """Return some of its rows."""
@@ -54,7 +56,10 @@ class Segment:
         if source is not None:
             factor = source.time.size // self.time.size
             source = source.part(slice(rows.start * factor, rows.stop * factor))
-        return Segment(self.time[rows], self.position[rows], self.voltage[rows], reference, source)
+        finer = None if self.finer is None else self.finer[rows]
+        return Segment(
+            self.time[rows], self.position[rows], self.voltage[rows], reference, source, finer=finer
+        )
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,16 @@ class Data:
     held: bool
     averaged: int = 1
     """Rows of the recording in one of these."""
+    early: float = 0.0
+    """Rows by which a held command acts before its own row, 0 to 1."""
+
+    def acted(self, segment: Segment, force: Floats, force_constant: float) -> Floats:
+        """Return a drive's force (N, (K,)) around rows, here of held commands, as and when it acted."""
+        if not self.held:
+            return force
+        if segment.finer is not None:
+            force = force + force_constant * segment.finer
+        return force + self.early * np.diff(force, append=force[-1:]) if self.early else force
 
     @property
     def period(self) -> float:
@@ -159,9 +174,26 @@ def averaged(segment: Segment, factor: int) -> Segment:
     edges = np.arange(count + 1) * factor + 0.5 * (factor - 1)
     held = np.diff(np.interp(edges, np.arange(given.size), given)) / factor
     reference = None if used.reference is None else mean(used.reference)
+    seen = _seen(used.voltage, factor)
+    seen[1:] -= 0.5 * (held[1:] + held[:-1])
+    seen[[0, -1]] = 0.0
     return Segment(
-        mean(used.time), mean(used.position), held, reference, used, segment.before, segment.run_in // factor
-    )
+        mean(used.time), mean(used.position), held, reference, used, segment.before,
+        segment.run_in // factor, seen,
+    )  # fmt: skip
+
+
+def _seen(command: Floats, factor: int) -> Floats:
+    """Return a held command (K,) as second differences of means of so many rows see it, (K / factor,).
+
+    Those of single rows see the mean of what was held before and after each. That of means is a sum of them,
+    weighed by a triangle over the rows before and after, once for each row of a mean.
+    """
+    around = 0.5 * (command + np.append(command[:1], command[:-1]))
+    triangle = factor - np.abs(np.arange(1 - factor, factor))
+    weights = np.convolve(triangle, np.ones(factor)) / factor**3
+    padded = np.pad(around, (factor - 1, factor - 1), mode="edge")
+    return np.convolve(padded, weights, mode="valid")[::factor]
 
 
 def behind_reading(segment: Segment, sensors: Sequence[Effect]) -> Floats:

@@ -6,7 +6,6 @@ missing shows in both; what one of them was bent to fit does not show in the oth
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,16 +13,13 @@ import numpy as np
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.forces.replicate import left_by
+from rtcomp.diagnosis.numerics.robust import shows
 from rtcomp.diagnosis.numerics.significance import SURE
 from rtcomp.diagnosis.positions.windows import GROUPS, Windows
 from rtcomp.kernels import Floats
 
 LEAST, MOST = 0.5, 1.5
 """Part of what an effect does below which nothing is the better guess, above which twice as much is."""
-TURNS = 30
-"""Turns of the robust fit."""
-NOTHING = 1e-12
-"""Part of the squared errors below which what an effect does is lost in rounding."""
 
 
 def denied(fitter: Fitter, model: Fitted, without: Fitted) -> bool:
@@ -53,29 +49,6 @@ def there(having: Sequence[Floats], without: Sequence[Floats]) -> bool:
     """
     part, error = shows(having, without)
     return part > max(LEAST, SURE * error) and part - SURE * error < MOST
-
-
-def shows(having: Sequence[Floats], without: Sequence[Floats]) -> tuple[float, float]:
-    """Return the part of what a model does beyond another one that their errors show, and its standard error.
-
-    Errors are one array (rows,) for each window or block. 1 where all of it is there, 0 where nothing is. The
-    factor of a robust fit: windows that went further off than half of them count by their size, not by its
-    square (Huber 1964, Ann. Math. Stat. 35(1)).
-    """
-    done = [other - own for own, other in zip(having, without, strict=True)]
-    square = np.array([float(np.sum(d**2)) for d in done])
-    along = np.array([float(np.sum(e * d)) for e, d in zip(without, done, strict=True)])
-    whole = np.array([float(np.sum(e**2)) for e in without])
-    if square.sum() <= NOTHING * whole.sum():
-        return 0.0, math.inf
-    part, weight, least = 1.0, np.ones(square.size), math.sqrt(NOTHING * (whole + square).mean())
-    for _ in range(TURNS):
-        off = np.sqrt(np.maximum(whole - 2.0 * part * along + part**2 * square, 0.0))
-        usual = max(float(np.median(off)), least)
-        weight = 1.0 / np.maximum(off, usual)
-        part = float(np.sum(weight * along) / max(np.sum(weight * square), 1e-300))
-    scatter = np.sum((weight * (along - part * square)) ** 2) * square.size / max(square.size - 1, 1)
-    return part, float(np.sqrt(scatter) / max(np.sum(weight * square), 1e-300))
 
 
 def errors(fitter: Fitter, model: Fitted, windows: Windows | None) -> list[Floats]:

@@ -12,9 +12,10 @@ from recorded import run, stage, there_and_back
 
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.numerics.robust import shows
 from rtcomp.diagnosis.positions.trajectory import Trajectory
 from rtcomp.diagnosis.positions.windows import Windows
-from rtcomp.diagnosis.search.confirmed import denied, errors, shows, there
+from rtcomp.diagnosis.search.confirmed import denied, errors, there
 
 COGGING = {"name": "cogging", "amplitude": 0.4, "period": 1.3e-4, "phase": 0.4}
 

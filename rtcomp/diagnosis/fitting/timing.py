@@ -1,0 +1,70 @@
+"""By how much a held command acts before its own row: a property of the recording, not of the axis.
+
+Nothing moves before it is pushed. But a log that reads the axis late within its row looks so, and a
+simulation that moves on by the speed at the end of its step does. Beside a resonance, a fortieth of a row is
+more than noise, and the nearest physics would be named for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.fitted import Fitted
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.forces.replicate import left_by
+from rtcomp.diagnosis.numerics.robust import shows
+from rtcomp.diagnosis.numerics.significance import SURE
+from rtcomp.errors import ConfigError
+from rtcomp.kernels import Floats
+
+
+def put_in_step(fitter: Fitter, terms: Sequence[Term]) -> None:
+    """Let the command act as early as a model of `terms` shows, where that is plainly before its row.
+
+    What a fit finds on a replicate of the model, whose command acts at its row, is the method's own error.
+    """
+    balance = fitter.balance
+    if not balance.data.held:
+        return
+    if balance.data.early:  # a poorer model may have bent it
+        balance.act_early(0.0)
+    model = fitter.fit(terms, steps=0)
+    rows, error = early(fitter, model)
+    if rows < SURE * error:
+        return
+    try:
+        stage = fitter.stage(model, between=True)
+    except ConfigError:
+        return
+    data = left_by(stage, balance)
+    if data is None:
+        return
+    other = fitter.on(data)
+    own, own_error = early(other, other.fit(terms, model, steps=0))
+    if rows - own > SURE * float(np.hypot(error, own_error)):
+        balance.act_early(min(rows - own, 1.0))
+
+
+def early(fitter: Fitter, model: Fitted) -> tuple[float, float]:
+    """Return the rows by which the command acts before its own beside a model, and their standard error.
+
+    To first order, which is exact for a command that is held; what the model's own numbers can make of it is
+    left out of it.
+    """
+    balance = fitter.balance
+    columns = model.system.columns[model.coefficients != 0.0]
+    a_row_early = balance.on(replace(balance.data, early=1.0))
+    left = a_row_early.error(model.entries, model.coefficients, model.weights)
+    moved, rows = left - model.residual, fitter.rows
+    sizes = np.linalg.lstsq(columns[:, rows].T, moved[rows], rcond=1e-9)[0]
+    moved = moved - sizes @ columns
+    return shows(_by_block(fitter, model.residual + moved), _by_block(fitter, model.residual))
+
+
+def _by_block(fitter: Fitter, residual: Floats) -> list[Floats]:
+    edges = np.searchsorted(fitter.block, np.arange(fitter.blocks + 1))
+    return [residual[edges[i] : edges[i + 1]] for i in np.flatnonzero(fitter.use)]
