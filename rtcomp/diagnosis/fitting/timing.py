@@ -7,6 +7,7 @@ more than noise, and the nearest physics would be named for it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -18,14 +19,21 @@ from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.forces.replicate import left_by
 from rtcomp.diagnosis.numerics.robust import shows
 from rtcomp.diagnosis.numerics.significance import SURE
+from rtcomp.diagnosis.settings import LEFT
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
+STEP = 0.01
+"""Rows by which the command is moved to see what that does."""
+TURNS = 2
+"""Times that it is looked for again from where it was found: it goes by the square of the rows, too."""
+
 
 def put_in_step(fitter: Fitter, terms: Sequence[Term]) -> None:
-    """Let the command act as early as a model of `terms` shows, where that is plainly before its row.
+    """Let the command act as early as a model of `terms` shows, where that explains what the model leaves.
 
-    What a fit finds on a replicate of the model, whose command acts at its row, is the method's own error.
+    Beside a wrong model it may seem early as well, and then leaves more than an effect may (`LEFT`). What a
+    fit finds on a replicate of the model, whose command acts at its row, is the method's own error.
     """
     balance = fitter.balance
     if not balance.data.held:
@@ -44,22 +52,31 @@ def put_in_step(fitter: Fitter, terms: Sequence[Term]) -> None:
     if data is None:
         return
     other = fitter.on(data)
-    own, own_error = early(other, other.fit(terms, model, steps=0))
-    if rows - own > SURE * float(np.hypot(error, own_error)):
-        balance.act_early(min(rows - own, 1.0))
+    again = other.fit(terms, model, steps=0)
+    own, own_error = early(other, again)
+    rows -= own
+    if rows < SURE * math.hypot(error, own_error):
+        return
+    beside = model
+    for _ in range(TURNS):
+        balance.act_early(min(max(rows, 0.0), 1.0))
+        beside = fitter.fit(terms, model, steps=0)
+        rows = balance.data.early + early(fitter, beside)[0] - own
+    noise = again.sse
+    if beside.sse - noise > LEFT * (model.sse - noise):
+        balance.act_early(0.0)
 
 
 def early(fitter: Fitter, model: Fitted) -> tuple[float, float]:
-    """Return the rows by which the command acts before its own beside a model, and their standard error.
+    """Return the rows by which the command acts earlier yet beside a model, and their standard error.
 
-    To first order, which is exact for a command that is held; what the model's own numbers can make of it is
-    left out of it.
+    To first order. What the model's own numbers can make of it is left out of it.
     """
     balance = fitter.balance
     columns = model.system.columns[model.coefficients != 0.0]
-    a_row_early = balance.on(replace(balance.data, early=1.0))
-    left = a_row_early.error(model.entries, model.coefficients, model.weights)
-    moved, rows = left - model.residual, fitter.rows
+    later = balance.on(replace(balance.data, early=balance.data.early + STEP))
+    left = later.error(model.entries, model.coefficients, model.weights)
+    moved, rows = (left - model.residual) / STEP, fitter.rows
     sizes = np.linalg.lstsq(columns[:, rows].T, moved[rows], rcond=1e-9)[0]
     moved = moved - sizes @ columns
     return shows(_by_block(fitter, model.residual + moved), _by_block(fitter, model.residual))

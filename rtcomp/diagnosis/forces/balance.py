@@ -20,6 +20,7 @@ from rtcomp.diagnosis.cache import KEPT_ONCE, Cache, Group, key_of
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.forces.bank import AS_IT_IS
 from rtcomp.diagnosis.forces.blocks import cut
+from rtcomp.diagnosis.forces.kinematics import acted
 from rtcomp.diagnosis.forces.noise import Noise, Whitening
 from rtcomp.diagnosis.forces.reaches import MOST_OWN, joined
 from rtcomp.diagnosis.forces.sides import exact
@@ -31,7 +32,7 @@ from rtcomp.diagnosis.recordings.data import Data, Segment
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place
-from rtcomp.stage.balance import around_rows, forces, parts_of_drive
+from rtcomp.stage.balance import forces, parts_of_drive
 from rtcomp.stage.stage import Stage
 
 
@@ -302,8 +303,7 @@ class ForceBalance(Signals):
             parts = parts_of_drive(chain) if self.data.held else 1
             over = forces(stage, chain, s.time, p.x, p.v, p.a, held, parts=parts)
             f = forces(stage, whole, s.time, p.x, p.v, p.a, held, self.grain)
-            drive = over.held_drive() if self.data.held else around_rows(over.drive)
-            given.append(self.data.acted(s, drive, stage.force_constant))
+            given.append(acted(over, s, self.data, stage.force_constant))
             needed.append(f.mass * p.measured - f.others())
         return self.smooth(given), self.smooth(needed)
 

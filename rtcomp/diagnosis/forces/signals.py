@@ -15,7 +15,7 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.cache import Cache, Group, key_of
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.forces.bank import AS_IT_IS, SPEED_UNITS, deflections, units_along
-from rtcomp.diagnosis.forces.kinematics import Path, second_difference
+from rtcomp.diagnosis.forces.kinematics import Path, acted, second_difference
 from rtcomp.diagnosis.forces.led import led_there, way_there
 from rtcomp.diagnosis.forces.noise import Noise
 from rtcomp.diagnosis.forces.play import Carried, Load, behind_play
@@ -163,8 +163,7 @@ class Signals:
         for s, p in zip(self.data.segments, self.paths(sensors), strict=True):
             parts = parts_of_drive(chain) if self.data.held else 1
             f = forces(self.stage, chain, s.time, p.x, p.v, p.a, self.given(s), parts=parts)
-            driven = f.held_drive() if self.data.held else around_rows(f.drive)
-            found.append(self.data.acted(s, driven, self.stage.force_constant) + around_rows(f.push))
+            found.append(acted(f, s, self.data, self.stage.force_constant) + around_rows(f.push))
         return found
 
     def _base(

@@ -74,14 +74,6 @@ class Data:
     early: float = 0.0
     """Rows by which a held command acts before its own row, 0 to 1."""
 
-    def acted(self, segment: Segment, force: Floats, force_constant: float) -> Floats:
-        """Return a drive's force (N, (K,)) around rows, here of held commands, as and when it acted."""
-        if not self.held:
-            return force
-        if segment.finer is not None:
-            force = force + force_constant * segment.finer
-        return force + self.early * np.diff(force, append=force[-1:]) if self.early else force
-
     @property
     def period(self) -> float:
         """Time between rows (s)."""
