@@ -47,7 +47,8 @@ def baseline(balance: ForceBalance) -> Fitted:
     """Whiten `balance`, settle its grid of yield displacements, and return the refitted belief."""
     m = balance.stage.mechanics
     sizes = [float(size) for entry in balance.believed for size in ent.sizes_of(entry)]
-    balance.whiten(np.array([m.mass, m.viscous, m.micro_damping, 0.0, *balance.weights, 0.0, *sizes]))
+    friction = [*np.ones(balance.models.size), *balance.weights]
+    balance.whiten(np.array([m.mass, m.viscous, m.micro_damping, 0.0, *friction, 0.0, *sizes]))
     fitter = Fitter(balance)
     _put_grid(fitter, ())
     balance.whiten(fitter.fit([]).coefficients)

@@ -33,6 +33,7 @@ def prior_of(balance: ForceBalance, terms: Sequence[Term], system: System, *, of
             mean[i], precision[i] = value, (BELIEF_SD * value) ** -2
         elif balance.without(BASE[i]):
             high[i] = 0.0
+    mean[balance.model], precision[balance.model] = 1.0, BELIEF_SD**-2
     low[0] = 1e-3 * m.mass
     if balance.believed_speed is None:
         low[balance.faster], high[balance.faster] = -balance.speed_room, balance.speed_room

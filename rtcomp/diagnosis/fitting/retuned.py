@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rtcomp.diagnosis.forces.models import levels
 from rtcomp.diagnosis.result import Retuned, Value
 from rtcomp.kernels import Floats
 from rtcomp.physics.maxwell_slip import MaxwellSlip
@@ -15,6 +16,7 @@ from rtcomp.units import for_axis, power_of
 
 MOVED = 0.02
 """Relative change of a parameter that is worth reporting."""
+NONE = np.zeros(0)
 FREEDOM, WIDE = 9, 2.262
 """Degrees of freedom of about ten blocks, and standard deviations of a 95 % interval from them (Student)."""
 
@@ -75,19 +77,23 @@ def widening(clear: Floats, family: int) -> float:
     return np.inf
 
 
-def level_and_reach(elements: Sequence[Sequence[float]]) -> tuple[float, float]:
+def level_and_reach(elements: Sequence[Sequence[float]], models: Floats = NONE) -> tuple[float, float]:
     """Return friction.level (N, sum of yield forces) and friction.reach (m, travel to half of it).
 
-    An element is its stiffness (N/m) and its reach (m).
+    An element is its stiffness (N/m) and its reach (m). Beside `models` of friction, by their levels (N),
+    there is no reach: 0.
     """
     k, r = np.array([e[0] for e in elements]), np.array([e[1] for e in elements])
     level = float(np.sum(k * r))
     travel = np.concatenate([[0.0], np.sort(r)])
     force = np.array([float(np.sum(k * np.minimum(x, r))) for x in travel])
-    return level, float(np.interp(0.5 * level, force, travel))
+    reach = 0.0 if models.size else float(np.interp(0.5 * level, force, travel))
+    return level + float(np.sum(models)), reach
 
 
 def believed_friction(stage: Stage) -> tuple[float, float]:
-    """Return friction.level (N) and friction.reach (m) of the belief; 0 where it has no stop elements."""
+    """Return friction.level (N) and friction.reach (m) of the belief; 0 where it has none."""
     friction = stage.friction
-    return level_and_reach(friction.elements) if isinstance(friction, MaxwellSlip) else (0.0, 0.0)
+    if isinstance(friction, MaxwellSlip):
+        return level_and_reach(friction.elements)
+    return float(np.sum(levels(stage))), 0.0

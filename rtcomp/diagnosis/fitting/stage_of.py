@@ -13,7 +13,8 @@ from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.forces.balance import BASE, ForceBalance
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
-from rtcomp.physics import catalogue
+from rtcomp.physics import Parameter, catalogue
+from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.stage.stage import Stage
 from rtcomp.units import power_of
 
@@ -52,9 +53,10 @@ def stage_of(balance: ForceBalance, fitted: Fitted, *, between: bool = False) ->
         for k, r, f in zip(stiffness, reaches, level, strict=True)
         if f > least
     ]
+    model = [friction_in("N", data["stage"]["friction"], float(factor)) for factor in c[balance.model]]
     mechanics.pop("friction", None)
-    if units:
-        mechanics["friction"] = units
+    if model or units:
+        mechanics["friction"] = model[0] if model else units
     believed: list[Entry] = []
     at = iter(fitted.system.of_entry)
     refitted = {id(e): next(at) for e in balance.believed}
@@ -64,7 +66,8 @@ def stage_of(balance: ForceBalance, fitted: Fitted, *, between: bool = False) ->
         believed.append(dict(entry) if span is None else ent.composed(entry, c[span]))
     offset = float(c[balance.size - 1])
     constant: list[Entry] = [bias_entry(-offset)] if offset != 0.0 else []
-    effects = merged([*believed, *constant, *fitted.entries])
+    besides: list[Entry] = [{"name": MaxwellSlip.name, "elements": units}] if model and units else []
+    effects = merged([*believed, *constant, *fitted.entries, *besides])
     mechanics["effects"] = effects
     if not effects:
         del mechanics["effects"]
@@ -83,16 +86,33 @@ def in_units(stage: Stage, unit: str, factor: float) -> Stage:
     changes: dict[str, Any] = {
         key: factor ** power_of(unit, of) * getattr(m, key) for key, of in UNITS.items()
     }
-    if isinstance(m.friction, list):
-        stiffness, reach = (factor ** power_of(unit, of) for of in ("N/m", "m"))
-        changes["friction"] = [
-            {"stiffness": stiffness * e.stiffness, "reach": reach * e.reach} for e in m.friction
-        ]
+    friction = stage.to_dict()["stage"].get("friction")
+    if friction:
+        changes["friction"] = friction_in(unit, friction, factor)
     changed = stage.with_changes(stage=changes).to_dict()
     effects = [dict(e) for e in changed["stage"].get("effects", [])]
     if effects:
         changed["stage"]["effects"] = [_in_units(e, unit, factor) for e in effects]
     return Stage.from_dict(changed)
+
+
+def friction_in(unit: str, friction: Any, factor: float) -> Any:
+    """Return friction of a stage file in another `unit`: stop elements, or a model of the catalogue."""
+    if isinstance(friction, list):
+        return [_scaled(MaxwellSlip.element, each, unit, factor) for each in friction]
+    kind = catalogue.entry(str(friction["model"]))
+    found = _scaled(kind.parameters, friction, unit, factor)
+    items = friction.get("elements")
+    return found if items is None else {
+        **found, "elements": [_scaled(kind.element, each, unit, factor) for each in items]
+    }  # fmt: skip
+
+
+def _scaled(
+    parameters: Sequence[Parameter], entry: Mapping[str, Any], unit: str, factor: float
+) -> dict[str, Any]:
+    times = {p.name: factor ** power_of(unit, p.unit) for p in parameters if p.name in entry}
+    return {**entry, **{name: float(entry[name]) * by for name, by in times.items()}}
 
 
 def with_effect(stage: Stage, entry: Mapping[str, Any]) -> Stage:

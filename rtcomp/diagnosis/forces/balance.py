@@ -64,8 +64,9 @@ class ForceBalance(Signals):
         below = [filtered(s, self.data.rate, self.noise.wiener) for s in shaken]
         self.noise_power = float(np.mean(np.concatenate(below) ** 2))
         self._cache = Cache()
-        held = float(np.sum(coefficients[self.friction] * self.reaches))
-        believed = float(np.sum(self.weights * self.reaches))
+        own = float(np.sum(coefficients[self.model] * self.models))
+        held = float(np.sum(coefficients[self.friction] * self.reaches)) + own
+        believed = float(np.sum(self.weights * self.reaches)) + own
         self.level = max(held, believed) if self.stage.friction is not None or held > 0.0 else np.inf
         self._weigh()
         self.block, self._reserved = cut(self)

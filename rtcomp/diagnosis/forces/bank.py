@@ -1,7 +1,8 @@
 """Friction as columns: what each unit of the base does along a motion, with what changes friction at work.
 
 Units are viscous friction and micro-damping of size 1, the derivative of that by the logarithm of its speed,
-and a stop element of 1 N/m for each reach. All go along the motion in one pass, the elements by the law of
+the model of friction that is believed, where that is not of stop elements, and a stop element of 1 N/m for
+each reach. All go along the motion in one pass, the elements by the law of
 the catalogue's and not by a call of it for each. What depends on the whole of friction (its level, how far it
 is along its branch) is given that of the friction at hand, of which the units are parts: it stays linear.
 """
@@ -12,6 +13,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rtcomp.diagnosis.forces.bending import bend, bent_sum
+from rtcomp.diagnosis.forces.models import own_models
 from rtcomp.kernels import Floats, compiled, summing
 from rtcomp.physics import Effect
 from rtcomp.physics.closing import ClosingBranches
@@ -37,11 +40,9 @@ from rtcomp.stage.stage import Stage
 AS_IT_IS = (1.0, 1.0)
 """Times its stiffness and its level, for what asks for the whole of friction."""
 SPEED_UNITS = 3
-"""Units before the stop elements: viscous friction, micro-damping, its derivative."""
+"""First units: viscous friction, micro-damping, its derivative."""
 FASTER = 0.02
 """Relative change of the speed of micro-damping to which its damping is looked at."""
-MORE = 1e-4
-"""Part of the level that an element is made larger by, to see what it does to bent branches."""
 
 
 def units_along(
@@ -57,9 +58,9 @@ def units_along(
     sizes: Floats | None = None,
     larger: tuple[float, float] = AS_IT_IS,
 ) -> Floats:
-    """Return the force (N) of each unit around the rows of a motion, (K, 3 + reaches).
+    """Return the force (N) of each unit around the rows of a motion, (K, 3 + models + reaches).
 
-    With `sizes` of the stop elements, (reaches,), their sum times these instead of them: (K, 4).
+    With `sizes` of the stop elements, (reaches,), their sum times these instead of them: (K, 4 + models).
 
     `motion` is (K, 5): time (s), position (m), velocity, acceleration, the command held up to each row (V);
     `weights` (N/m) of the elements make the friction at hand; what asks for the whole of it finds its
@@ -73,6 +74,7 @@ def units_along(
         MicroDamping(coefficient=1.0, speed=below),
         MicroDamping(coefficient=1.0, speed=(1.0 + FASTER) * below),
     ]
+    own = own_models(stage)
     models = MaxwellSlip.order
     chain = sorted(modifiers, key=lambda e: e.order)
     before = [*sorted(drive, key=lambda e: (e.place, e.order)), *(e for e in chain if e.order < models)]
@@ -81,12 +83,12 @@ def units_along(
     # One for the whole, and one for each element (or for their sum): the whole with a little more of that.
     bent = [e for e in bending for _ in range(1 + (len(reaches) if sizes is None else 1))]
     after = [e for e in after if e.name != ClosingBranches.name]
-    program = Program([*before, *units, *bent, *after])
+    program = Program([*before, *units, *own, *bent, *after])
     row = float((motion[-1, 0] - motion[0, 0]) / max(motion.shape[0] - 1, 1))
     needed = parts_of([*before, *after], row)
     parts = max(needed, least_parts)
     times = weights if sizes is None else sizes
-    columns = SPEED_UNITS + (len(reaches) if sizes is None else 1)
+    columns = SPEED_UNITS + len(own) + (len(reaches) if sizes is None else 1)
     out = np.empty((motion.shape[0], columns if parts == 1 else SPEED_UNITS))
     mean = np.zeros((motion.shape[0] if parts > 1 else 1, columns))
     w = np.zeros(COUNT)
@@ -96,7 +98,8 @@ def units_along(
     smooth = parts > needed == 1  # damping is, between rows
     whole = bool(bent or after) or any(e.whole_friction for e in before)
     _along(
-        program.steps, program.p, program.s, w, base, motion, parts, smooth, whole, len(before), len(bent),
+        program.steps, program.p, program.s, w, base, motion, parts, smooth, whole, len(before), len(own),
+        len(bent),
         *larger, weights, reaches, deflection, sizes is not None, times, out, mean,
     )  # fmt: skip
     found = around_rows(out) if parts == 1 else mean
@@ -129,6 +132,7 @@ def _along(
     smooth: bool,
     whole: bool,
     first: int,
+    own: int,
     bent: int,
     stiffer: float,
     higher: float,
@@ -142,7 +146,7 @@ def _along(
 ) -> None:
     """Fill `out` with forces at the rows: units of speed are the effects from `first` on.
 
-    After them comes what each element holds, or `summed` up, `times` so many each.
+    After them come `own` models of friction, and what each element holds, or all so many `times`, `summed` up.
 
     Where rows are cut into `parts`, fill `mean` with their means around each row instead: over the row before
     it weighed by what has passed of that, and over the row after it by what is to come. Units of speed that
@@ -153,8 +157,8 @@ def _along(
     elements in proportion to what each holds.
     """
     count = weights.size
-    then = first + SPEED_UNITS
-    level = stiffness = 0.0
+    then = first + SPEED_UNITS + own
+    level = stiffness = its_level = its_stiffness = 0.0
     for i in range(count):
         level += weights[i] * reaches[i]
         stiffness += stiffer * weights[i]
@@ -164,13 +168,14 @@ def _along(
         for j in range(1, parts + 1):
             along_row(w, motion, k, float(j), parts)
             renew(w, base[0], base[1])
-            w[GRIP_LEVEL], w[GRIP_STIFFNESS] = higher * level, stiffness
+            w[GRIP_LEVEL], w[GRIP_STIFFNESS] = higher * level + its_level, stiffness + its_stiffness
             run_chain(steps, p, s, w, 0, first)
             if j == parts or not smooth:
                 for i in range(SPEED_UNITS):
                     w[FRICTION] = 0.0
                     run_chain(steps, p, s, w, first + i, first + i + 1)
                     here[i] = w[FRICTION]
+            believed, its_level, its_stiffness = _believed(steps, p, s, w, first + SPEED_UNITS, own)
             asked = 0.0
             if summed and w[SOFTENS] == 0.0:  # nobody asks what each element holds
                 moved, longer = w[MOVED], w[REACH]
@@ -183,22 +188,45 @@ def _along(
             grown = 1.0
             if whole:
                 # The whole is what the chain sees from here on, and at the next step.
-                w[GRIP], w[GRIP_LEVEL], w[GRIP_STIFFNESS] = total, level, stiffness
-                w[FRICTION] = total
+                w[GRIP], w[FRICTION] = total + believed, total + believed
+                w[GRIP_LEVEL], w[GRIP_STIFFNESS] = level + its_level, stiffness + its_stiffness
                 if bent > 0 and level > 0.0 and summed:
-                    asked = _bent_sum(steps, p, s, w, then, total, level, asked, level_asked)
+                    asked = bent_sum(steps, p, s, w, then, total, level, asked, level_asked)
                 elif bent > 0 and level > 0.0:
-                    _bend(steps, p, s, w, then, total, level, weights, reaches, held)
+                    bend(steps, p, s, w, then, total, level, weights, reaches, held)
                 grown = _grown(steps, p, s, w, then + bent)
-            if summed:
-                here[SPEED_UNITS] = grown * asked
-            else:
-                for i in range(count):
-                    here[SPEED_UNITS + i] = grown * held[i]
+            _put(here, own, grown, believed, summed, asked, held)
             if parts > 1:
                 _share_out(mean, here, last, k, j, parts)
         for i in range(out.shape[1]):
             out[k, i] = here[i]
+
+
+@compiled
+def _believed(
+    steps: np.ndarray, p: Floats, s: Floats, w: Floats, at: int, own: int
+) -> tuple[float, float, float]:
+    """Return force and level (N) and stiffness (N/m) of the model of friction at `at`, where there is one."""
+    if own == 0:
+        return 0.0, 0.0, 0.0
+    w[FRICTION] = 0.0
+    run_chain(steps, p, s, w, at, at + own)
+    return w[FRICTION], w[GRIP_LEVEL], w[GRIP_STIFFNESS]
+
+
+@compiled
+def _put(
+    here: Floats, own: int, grown: float, believed: float, summed: bool, asked: float, held: Floats
+) -> None:
+    """Put what friction holds behind the units of speed, `grown` times as large."""
+    stops = SPEED_UNITS + own
+    if own > 0:
+        here[SPEED_UNITS] = grown * believed
+    if summed:
+        here[stops] = grown * asked
+        return
+    for i in range(held.size):
+        here[stops + i] = grown * held[i]
 
 
 @summing
@@ -269,63 +297,3 @@ def _share_out(mean: Floats, here: Floats, last: Floats, k: int, j: int, parts: 
             mean[k - 1, i] += (1.0 - passed) * share
         if k == end:
             mean[k, i] += (1.0 - passed) * share
-
-
-@compiled
-def _bend(
-    steps: np.ndarray,
-    p: Floats,
-    s: Floats,
-    w: Floats,
-    first: int,
-    total: float,
-    level: float,
-    weights: Floats,
-    reaches: Floats,
-    held: Floats,
-) -> None:
-    """Put into `held` (N/(N/m)) of each stop element what a little more of it does to the bent whole.
-
-    The bent force is in proportion to all weights together, so their products with these sum up to it, and a
-    fit of them converges even where its branches are far from those of the weights at hand. The effect
-    `first` bends the whole, `total` (N) at `level` (N); those after it the whole with more of one element.
-    """
-    count = weights.size
-    whole = rest = _bent(steps, p, s, w, first, total, level)
-    for i in range(count):
-        more = MORE * level / reaches[i]
-        larger = _bent(steps, p, s, w, first + 1 + i, total + more * held[i], level + more * reaches[i])
-        held[i] = (larger - whole) / more
-        rest -= weights[i] * held[i]
-    for i in range(count):  # what is missing of the whole is the rounding of these differences
-        held[i] += rest * reaches[i] / level
-    w[GRIP], w[GRIP_LEVEL], w[FRICTION] = whole, level, whole
-
-
-@compiled
-def _bent_sum(
-    steps: np.ndarray,
-    p: Floats,
-    s: Floats,
-    w: Floats,
-    first: int,
-    total: float,
-    level: float,
-    asked: float,
-    level_asked: float,
-) -> float:
-    """Return the sum of what `_bend` puts into elements, so many times each as make `asked` (N) unbent."""
-    whole = _bent(steps, p, s, w, first, total, level)
-    more = MORE * level / max(abs(level_asked), level)
-    other = total + more * (asked - total), level + more * (level_asked - level)
-    larger = _bent(steps, p, s, w, first + 1, other[0], other[1])
-    w[GRIP], w[GRIP_LEVEL], w[FRICTION] = whole, level, whole
-    return float(whole + (larger - whole) / more)
-
-
-@compiled
-def _bent(steps: np.ndarray, p: Floats, s: Floats, w: Floats, at: int, force: float, level: float) -> float:
-    """Return a friction `force` (N) of this `level` (N) as the effect number `at` bends it."""
-    w[GRIP], w[GRIP_LEVEL], w[FRICTION] = force, level, force
-    run_chain(steps, p, s, w, at, at + 1)
-    return float(w[GRIP])

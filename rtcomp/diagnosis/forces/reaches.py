@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rtcomp.diagnosis.recordings.data import Data
@@ -41,3 +43,13 @@ def joined(own: Floats, grid: Floats, step: float) -> Floats:
         return np.sort(grid)
     apart = np.min(np.abs(np.log(grid[:, None] / own[None, :])), axis=1)
     return np.sort(np.concatenate([own, grid[apart > 0.3 * step]]))
+
+
+def on_grid(elements: Sequence[Sequence[float]], reaches: Floats) -> Floats:
+    """Return the stiffnesses (N/m) at some `reaches` (m, (N,)) that hold as much as elements (N/m, m) do."""
+    found = np.zeros(reaches.size)
+    if elements:
+        k, r = np.array(elements).T
+        at = np.argmin(np.abs(np.log(reaches[:, None] / r)), axis=0)
+        np.add.at(found, at, k * r / reaches[at])
+    return found

@@ -17,9 +17,10 @@ from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.forces.bank import AS_IT_IS, SPEED_UNITS, deflections, units_along
 from rtcomp.diagnosis.forces.kinematics import Path, acted, second_difference
 from rtcomp.diagnosis.forces.led import led_there, way_there
+from rtcomp.diagnosis.forces.models import levels
 from rtcomp.diagnosis.forces.noise import Noise
 from rtcomp.diagnosis.forces.play import Carried, Load, behind_play
-from rtcomp.diagnosis.forces.reaches import grid
+from rtcomp.diagnosis.forces.reaches import grid, on_grid
 from rtcomp.diagnosis.forces.sides import exact
 from rtcomp.diagnosis.numerics.spectrum import filtered
 from rtcomp.diagnosis.recordings.data import Data, Segment, behind_reading
@@ -31,7 +32,7 @@ from rtcomp.stage.stage import Stage
 
 BASE = ("mass", "viscous", "micro_damping")
 """Numbers whose columns come first. After them that of the speed of micro-damping, to first order, then
-those of the friction units, and a constant force."""
+those of a believed model of friction, of the friction units, and a constant force."""
 FURTHEST = 0.3
 """Largest change of its logarithm that is taken from one fit."""
 PARTS = 2
@@ -56,11 +57,12 @@ class Signals:
         self.step = float(np.log(self.reaches[1] / self.reaches[0]))
         """Between yield displacements (logarithm)."""
         believed = [dict(e) for e in stage.mechanics.effects]
-        self.believed = [e for e in believed if _refitted(e)]
+        self.believed = [e for e in believed if ent.adds_force(ent.kind_of(e))]
         """Entries of the belief that add a force: their sizes are refitted with the base."""
-        self._fixed = exact((ent.build(e) for e in believed if not _refitted(e)), data.held)
+        self._fixed = exact((ent.build(e) for e in believed if not ent.adds_force(ent.kind_of(e))), data.held)
         friction = stage.friction
         self._elements = list(friction.elements) if isinstance(friction, MaxwellSlip) else []
+        self.models = levels(stage)
         self._cache = Cache()
         m = stage.mechanics
         self.believed_speed = m.micro_damping_speed if m.micro_damping > 0.0 else None
@@ -75,13 +77,18 @@ class Signals:
 
     @property
     def size(self) -> int:
-        """Columns of the base: mass, damping and its speed, friction units, and last a constant force."""
-        return len(BASE) + 1 + self.reaches.size + 1
+        """Columns of the base: mass, damping and its speed, friction, and last a constant force."""
+        return int(self.friction.stop) + 1
+
+    @property
+    def model(self) -> slice:
+        """Column of a believed model of friction, as a factor of it; empty where there is none."""
+        return slice(len(BASE) + 1, len(BASE) + 1 + self.models.size)
 
     @property
     def friction(self) -> slice:
         """Columns of the friction units, in the order of `reaches`."""
-        return slice(len(BASE) + 1, len(BASE) + 1 + self.reaches.size)
+        return slice(self.model.stop, self.model.stop + self.reaches.size)
 
     @property
     def faster(self) -> int:
@@ -224,23 +231,24 @@ class Signals:
             return found
 
         def of_sizes(sizes: Floats) -> list[Floats]:
-            some = sizes[SPEED_UNITS:] != 0.0
+            some = sizes[stops:] != 0.0
             if whole:
                 some |= held != 0.0
-            whole_of_it = np.append(sizes[:SPEED_UNITS], 1.0)
-            return [table @ whole_of_it for table in units(some=some, times=sizes[SPEED_UNITS:])]
+            whole_of_it = np.append(sizes[:stops], 1.0)
+            return [table @ whole_of_it for table in units(some=some, times=sizes[stops:])]
 
         def by_load() -> list[Floats]:
             some = held != 0.0
             pairs = zip(units(MORE, some, held), units(0.0, some, held), strict=True)
-            return [(more - plain)[:, SPEED_UNITS] / MORE for more, plain in pairs]
+            return [(more - plain)[:, SPEED_UNITS:].sum(axis=1) / MORE for more, plain in pairs]
 
+        stops = SPEED_UNITS + self.models.size
         held = self.weights if weights is None else weights
         speed = self.stage.mechanics.micro_damping_speed
         key = (key_of(before), key_of(modifiers), key_of(sensors), behind, own)
         columns = [
             Group(("mass", key_of(others), key_of(sensors), behind), mass),
-            Group(("units", speed, *key), units, of_sizes, SPEED_UNITS + self.reaches.size),
+            Group(("units", speed, *key), units, of_sizes, stops + self.reaches.size),
             Group(("offset",), lambda: [np.ones(s.time.size) for s in self.data.segments]),
         ]
         return columns, Group(("by load", held.tobytes(), *key), by_load) if before else None
@@ -268,12 +276,7 @@ class Signals:
     @property
     def weights(self) -> Floats:
         """Believed friction as stiffnesses (N/m) of the units."""
-        found = np.zeros(self.reaches.size)
-        if self._elements:
-            k, r = np.array(self._elements).T
-            at = np.argmin(np.abs(np.log(self.reaches[:, None] / r)), axis=0)
-            np.add.at(found, at, k * r / self.reaches[at])
-        return found
+        return on_grid(self._elements, self.reaches)
 
     def _units(
         self,
@@ -338,11 +341,6 @@ def _active(effect: Effect) -> bool:
     """Tell whether an effect is away from the values at which it changes nothing."""
     neutral = effect.neutral or {}
     return not neutral or any(effect.values[name] != value for name, value in neutral.items())
-
-
-def _refitted(entry: Entry) -> bool:
-    kind = ent.kind_of(entry)
-    return ent.adds_force(kind) and bool(kind.linear)
 
 
 def _all(frequency: Floats) -> Floats:
