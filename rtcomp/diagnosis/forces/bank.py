@@ -146,7 +146,7 @@ def _along(
 ) -> None:
     """Fill `out` with forces at the rows: units of speed are the effects from `first` on.
 
-    After them come `own` models of friction, and what each element holds, or all so many `times`, `summed` up.
+    After them come `own` models of friction and what each element holds, or so many `times`, `summed` up.
 
     Where rows are cut into `parts`, fill `mean` with their means around each row instead: over the row before
     it weighed by what has passed of that, and over the row after it by what is to come. Units of speed that

@@ -233,6 +233,15 @@ class Trajectory(Fitter):
         c, found, _ = self.moved(c, found, max(steps, starting.FEW), entries=steps > 0, slopes=near)
         return self._ended(c, found)
 
+    def as_believed(self) -> Fitted:
+        """Return the belief as it is, none of its numbers moved."""
+        return self._ended(np.zeros(len(self.belief.numbers)), [])
+
+    def left_as_believed(self) -> Floats:
+        """Return the squared error of the belief as it is in each block to fit, (B,)."""
+        rest = self.residual(np.zeros(len(self.belief.numbers)), [])
+        return np.asarray(np.bincount(self.block, rest**2, self.blocks)[self.use])
+
     def moved(
         self, c: Floats, terms: list[Term], steps: int, *, entries: bool, slopes: Floats | None = None
     ) -> tuple[Floats, list[Term], float]:

@@ -19,6 +19,7 @@ from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.unbiased import numbers_of
 from rtcomp.diagnosis.forces.replicate import left_by
 from rtcomp.diagnosis.numerics.significance import Null, log_gain
+from rtcomp.diagnosis.positions.trajectory import Trajectory
 from rtcomp.diagnosis.settings import LEVEL, REPLICATES
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
@@ -104,6 +105,18 @@ def null_of(
         found += drawn
         first, last = last, min(last + MORE, REPLICATES)
     return null
+
+
+def null_of_belief(fitter: Trajectory, seed: int) -> Null | None:
+    """Return what a belief, as it is, leaves of recordings of its own; None where it makes too few."""
+    stage = fitter.belief.stage
+
+    def one(number: int) -> Floats | None:
+        data = left_by(stage, fitter.balance, 1000 * seed + number)
+        return None if data is None else fitter.on(data).left_as_believed()
+
+    errors = [e for e in shared(one, range(FEW)) if e is not None]
+    return Null(np.zeros(len(errors)), np.array(errors)) if len(errors) >= FEW // 2 else None
 
 
 def _null(fitted: Fitted, found: Sequence[Drawn], chance: Floats) -> Null:
