@@ -53,7 +53,8 @@ def stage_of(balance: ForceBalance, fitted: Fitted, *, between: bool = False) ->
         for k, r, f in zip(stiffness, reaches, level, strict=True)
         if f > least
     ]
-    model = [friction_in("N", data["stage"]["friction"], float(factor)) for factor in c[balance.model]]
+    kept = [float(factor) for factor in c[balance.model] if factor > SLIGHT]
+    model = [friction_in("N", data["stage"]["friction"], factor) for factor in kept]
     mechanics.pop("friction", None)
     if model or units:
         mechanics["friction"] = model[0] if model else units

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from recorded import run, stage, there_and_back
 
 from rtcomp.diagnosis.fitting.baseline import baseline
 from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.stage_of import friction_in
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.pipeline import diagnose
@@ -38,6 +41,21 @@ def test_its_size_is_found_and_written(name: str, larger: float) -> None:
     assert written.friction is not None and written.friction.name == name
     drive, needed = balance.both_sides(written)
     assert np.std(drive - needed) < 0.02 * np.std(drive)
+
+
+def test_behind_a_play_stop_elements_have_its_place() -> None:
+    hidden = {"name": "backlash", "gap": 4e-6}
+    recording = run(stage(friction=model("leuven"), effects=[hidden]), there_and_back(8.0))
+    believed = stage(friction=model("leuven"))
+    balance = ForceBalance(believed, load_data([recording]))
+    baseline(balance)
+    fitter = Fitter(balance)
+    found = fitter.fit([Term.of(hidden)])
+    assert fitter.relative(found) < 0.5 * fitter.relative(fitter.fit([]))
+    nothing = found.coefficients.copy()
+    nothing[balance.model] = 0.0
+    written = fitter.stage(replace(found, coefficients=nothing)).friction
+    assert written is not None and written.name == "maxwell-slip"
 
 
 @pytest.mark.parametrize("name", ["lugre", "leuven"])
