@@ -14,12 +14,11 @@ from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.fitting.replicated import replicated
 from rtcomp.diagnosis.fitting.timing import put_in_step
 from rtcomp.diagnosis.forces.balance import ForceBalance
-from rtcomp.diagnosis.forces.replicate import left_by
 from rtcomp.diagnosis.forces.signals import FURTHEST
 from rtcomp.diagnosis.settings import LEAST_GAIN
-from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
 DENSE = 64
@@ -137,11 +136,7 @@ def _smooth(fitter: Fitter, terms: Sequence[Term]) -> None:
     balance = fitter.balance
     balance.smooth_for(SMOOTHED[0])
     model = fitter.fit(terms, steps=0)
-    try:
-        stage = fitter.stage(model, between=True)
-    except ConfigError:
-        return
-    data = left_by(stage, balance)
+    data = replicated(fitter, model)
     if data is None:
         return
     others = [fitter.on(data) for _ in SMOOTHED]

@@ -16,17 +16,11 @@ import numpy as np
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
-from rtcomp.diagnosis.forces.replicate import left_by
+from rtcomp.diagnosis.fitting.replicated import replicated
 from rtcomp.diagnosis.numerics.robust import shows
 from rtcomp.diagnosis.numerics.significance import SURE
 from rtcomp.diagnosis.settings import LEFT
-from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
-
-STEP = 0.01
-"""Rows by which the command is moved to see what that does."""
-TURNS = 2
-"""Times that it is looked for again from where it was found: it goes by the square of the rows, too."""
 
 
 def put_in_step(fitter: Fitter, terms: Sequence[Term]) -> None:
@@ -44,11 +38,7 @@ def put_in_step(fitter: Fitter, terms: Sequence[Term]) -> None:
     rows, error = early(fitter, model)
     if rows < SURE * error:
         return
-    try:
-        stage = fitter.stage(model, between=True)
-    except ConfigError:
-        return
-    data = left_by(stage, balance)
+    data = replicated(fitter, model)
     if data is None:
         return
     other = fitter.on(data)
@@ -57,11 +47,14 @@ def put_in_step(fitter: Fitter, terms: Sequence[Term]) -> None:
     rows -= own
     if rows < SURE * math.hypot(error, own_error):
         return
+    moved, more = math.inf, rows
     beside = model
-    for _ in range(TURNS):
+    while abs(more) < moved and abs(more) > error:  # what is left goes by the square of the rows
+        moved = abs(more)
         balance.act_early(min(max(rows, 0.0), 1.0))
         beside = fitter.fit(terms, model, steps=0)
-        rows = balance.data.early + early(fitter, beside)[0] - own
+        more = early(fitter, beside)[0] - own
+        rows = balance.data.early + more
     noise = again.sse
     if beside.sse - noise > LEFT * (model.sse - noise):
         balance.act_early(0.0)
@@ -70,13 +63,14 @@ def put_in_step(fitter: Fitter, terms: Sequence[Term]) -> None:
 def early(fitter: Fitter, model: Fitted) -> tuple[float, float]:
     """Return the rows by which the command acts earlier yet beside a model, and their standard error.
 
-    To first order. What the model's own numbers can make of it is left out of it.
+    To first order: the drive's force is of second order in the rows, so a difference over a row to both sides
+    is its slope. What the model's own numbers can make of it is left out of it.
     """
     balance = fitter.balance
     columns = model.system.columns[model.coefficients != 0.0]
-    later = balance.on(replace(balance.data, early=balance.data.early + STEP))
-    left = later.error(model.entries, model.coefficients, model.weights)
-    moved, rows = (left - model.residual) / STEP, fitter.rows
+    both = [balance.on(replace(balance.data, early=balance.data.early + way)) for way in (1.0, -1.0)]
+    before, after = (b.error(model.entries, model.coefficients, model.weights) for b in both)
+    moved, rows = 0.5 * (before - after), fitter.rows
     sizes = np.linalg.lstsq(columns[:, rows].T, moved[rows], rcond=1e-9)[0]
     moved = moved - sizes @ columns
     return shows(_by_block(fitter, model.residual + moved), _by_block(fitter, model.residual))

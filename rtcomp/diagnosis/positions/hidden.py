@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
-from rtcomp.diagnosis.forces.replicate import left_by
+from rtcomp.diagnosis.fitting.replicated import replicated
 from rtcomp.diagnosis.forces.sticking import untold
-from rtcomp.errors import ConfigError
 
 MUCH = 0.03
 """Part of the drive's force (rms). A balance of forces that leaves more than noise is no judge where friction
@@ -23,11 +22,7 @@ def hides(fitter: Fitter, model: Fitted) -> bool:
     balance = fitter.balance
     if untold(balance) <= MUCH:
         return False
-    try:
-        stage = fitter.stage(model, between=True)
-    except ConfigError:
-        return True
-    data = left_by(stage, balance)
+    data = replicated(fitter, model)
     if data is None:
         return True
     other = fitter.on(data)

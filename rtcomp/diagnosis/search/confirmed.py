@@ -12,10 +12,11 @@ import numpy as np
 
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
-from rtcomp.diagnosis.forces.replicate import left_by
+from rtcomp.diagnosis.fitting.replicated import replicated
 from rtcomp.diagnosis.numerics.robust import shows
 from rtcomp.diagnosis.numerics.significance import SURE
 from rtcomp.diagnosis.positions.windows import GROUPS, Windows
+from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 
 LEAST, MOST = 0.5, 1.5
@@ -30,10 +31,12 @@ def denied(fitter: Fitter, model: Fitted, without: Fitted) -> bool:
     """
     balance = fitter.balance
     windows = Windows.of(balance) if fitter.by_force else None
-    if there(*(errors(fitter, m, windows) for m in (model, without))):
-        return False
-    stage = fitter.stage(model, between=True)
-    data = left_by(stage, balance)
+    try:
+        if there(*(errors(fitter, m, windows) for m in (model, without))):
+            return False
+    except ConfigError:  # no stage has its numbers, so none moves by it
+        return True
+    data = replicated(fitter, model)
     if data is None:
         return False
     other = fitter.on(data)
