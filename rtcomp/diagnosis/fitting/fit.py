@@ -216,7 +216,7 @@ class Fitter:
     ) -> tuple[System, Prior, Grams, Floats, float]:
         """Return the system of `terms`, its prior, statistics, coefficients and squared error in sample."""
         system, prior, grams = self._made(terms, weights, around)
-        c = grams.solve(self.use, prior, variance)
+        prior, c = grams.relaxed(self.use, prior, variance)
         return system, prior, grams, c, float(grams.errors(c, self.use).sum())
 
     def _made(
@@ -245,13 +245,10 @@ class Fitter:
         count = max(int(self.rows.sum()), 1)
         entries, made_for = [t.entry for t in current], weights
         # From the variance of noise upwards: one that another model leaves makes too much of the belief.
-        system, prior, grams, c, sse = self.solve(current, made_for, 1.0)
-        variance = sse / count
+        system, _, _, c, sse = self.solve(current, made_for, 1.0)
         if by_weights(b, entries):
             made_for, current = c[b.friction], self._sized(current, system, c)
-            system, prior, grams = self._made(current, made_for, c)
-        c = grams.solve(self.use, prior, variance)
-        sse = float(grams.errors(c, self.use).sum())
+        system, prior, _, c, sse = self.solve(current, made_for, sse / count, c)
         variance = sse / count
         weights = c[b.friction]
         free = free_of(current, b)
