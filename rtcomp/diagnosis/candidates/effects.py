@@ -258,6 +258,12 @@ def _candidate(
         return None
 
 
+def on_other(candidate: Candidate, fitter: Fitter, fitted: Fitted) -> Candidate | None:
+    """Return a candidate with the columns that it has beside a model of other data; None where it has none."""
+    entry = candidate.term.entry
+    return _candidate(fitter, fitted, ent.kind_of(entry), (entry, candidate.looked))
+
+
 def _finite(candidate: Candidate) -> Candidate | None:
     """Return the candidate where its columns are finite and not all nothing."""
     with np.errstate(over="ignore"):  # what runs away is no candidate

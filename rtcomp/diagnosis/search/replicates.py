@@ -10,7 +10,7 @@ import numpy as np
 
 from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.candidates.effects import Candidate, candidates, started
+from rtcomp.diagnosis.candidates.effects import Candidate, candidates, on_other, started
 from rtcomp.diagnosis.candidates.screening import Screen, Screened
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting import starting
@@ -26,6 +26,8 @@ from rtcomp.kernels import Floats
 
 FEW, MORE = 6, 4
 """Replicates after which what is plain is settled; so many more at a time where it is not."""
+ANEW = 4
+"""Candidates made anew at a time on a replicate."""
 IN_FULL = 3
 """One of so many replicates drawn at a time is fitted with its best candidate: those with the largest."""
 
@@ -80,8 +82,8 @@ def null_of(
         if made:
             gains += zip(made, Screen(made, other, screen.variants).beside(again), strict=True)
         errors, numbers = again.errors * fitter.power / max(other.power, 1e-300), numbers_of(other, again)
-        candidate, screened = max(gains, key=lambda each: each[1].gain, default=(None, None))
-        if candidate is None or screened is None or screened.gain <= 0.0:
+        candidate, screened = _largest(other, again, gains, screen.variants)
+        if candidate is None or screened is None:
             return Drawn(0.0, errors, numbers)
         return Drawn(
             screened.gain, errors, numbers, lambda: gain_in_full(other, again, candidate, screened, full)
@@ -105,6 +107,26 @@ def null_of(
         found += drawn
         first, last = last, min(last + MORE, REPLICATES)
     return null
+
+
+def _largest(
+    fitter: Fitter, model: Fitted, gains: Sequence[tuple[Candidate, Screened]], variants: Floats
+) -> tuple[Candidate, Screened] | tuple[None, None]:
+    """Return the candidate that gains most beside a model of a replicate, by the columns it has there.
+
+    Columns of the recording see the same motion with other noise. What a replicate's own columns lack by
+    their noise, they would add: an instrument that the recording itself does not have. So those that seem to
+    gain most are made anew, until none that is left seems to gain more than the best of these.
+    """
+    order = sorted((each for each in gains if each[1].gain > 0.0), key=lambda each: -each[1].gain)
+    best: tuple[Candidate, Screened] | tuple[None, None] = (None, None)
+    while order and (best[1] is None or order[0][1].gain > best[1].gain):
+        some, order = order[:ANEW], order[ANEW:]
+        made = [c for c in (on_other(candidate, fitter, model) for candidate, _ in some) if c is not None]
+        for pair in zip(made, Screen(made, fitter, variants).beside(model), strict=True):
+            if pair[1].gain > (0.0 if best[1] is None else best[1].gain):
+                best = pair
+    return best
 
 
 def null_of_belief(fitter: Trajectory, seed: int) -> Null | None:
