@@ -20,6 +20,8 @@ LONGEST = 1.25
 """Longest period of a wave, relative to the stroke."""
 SMALL = 0.05
 """Size of a parameter, over that of the drive's force or of 1, that is taken to be first order."""
+SWINGS = 2.0
+"""Times the motion's bandwidth up to which a resonance may lie: at half of it, it swings a third more."""
 AT_BOUND = 1e-3
 """Part of a number, or of a short range, by which it may be away from its bound and still be at it."""
 
@@ -108,9 +110,10 @@ def _free_of(terms: Sequence[Term], balance: ForceBalance, *, sizes: bool) -> li
                 # A wave longer than the stroke is a slope by another name.
                 step, most = min(0.02, 0.02 * value / (high - low)), min(p.high, LONGEST * (high - low))
             elif p.unit == "Hz":
-                # Beyond the motion's bandwidth nothing swings that the recording could show; a stiff contact
-                # is as good as a rigid one, and needs not be shown.
-                most = min(p.high, balance.noise.bandwidth if p.default is None else balance.data.rate)
+                # What swings beyond the motion's bandwidth shows as far as motion makes it swing more than one
+                # that is held; a stiff contact is as good as a rigid one, and needs not be shown.
+                shown = min(SWINGS * balance.noise.bandwidth, 0.5 * balance.data.rate)
+                most = min(p.high, shown if p.default is None else balance.data.rate)
                 step = min(0.02, 0.01 / (value * balance.data.last)) if waves else step
             elif p.unit == "s" and p.name not in (kind.neutral or {}):
                 # A scale shorter than a row is no finding; a size may be as small as it is.
