@@ -259,7 +259,7 @@ def _candidate(
 
 
 def on_other(candidate: Candidate, fitter: Fitter, fitted: Fitted) -> Candidate | None:
-    """Return a candidate with the columns that it has beside a model of other data; None where it has none."""
+    """Return a candidate with the columns that it has beside a model of other data; None without."""
     entry = candidate.term.entry
     return _candidate(fitter, fitted, ent.kind_of(entry), (entry, candidate.looked))
 

@@ -110,7 +110,7 @@ def _free_of(terms: Sequence[Term], balance: ForceBalance, *, sizes: bool) -> li
                 # A wave longer than the stroke is a slope by another name.
                 step, most = min(0.02, 0.02 * value / (high - low)), min(p.high, LONGEST * (high - low))
             elif p.unit == "Hz":
-                # What swings beyond the motion's bandwidth shows as far as motion makes it swing more than one
+                # What swings beyond the motion's bandwidth shows where motion makes it swing more than one
                 # that is held; a stiff contact is as good as a rigid one, and needs not be shown.
                 shown = min(SWINGS * balance.noise.bandwidth, 0.5 * balance.data.rate)
                 most = min(p.high, shown if p.default is None else balance.data.rate)
