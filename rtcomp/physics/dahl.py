@@ -9,31 +9,18 @@ from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
 from rtcomp.physics.softening import softened
 from rtcomp.physics.wires import FRICTION, GRIP, GRIP_LEVEL, GRIP_STIFFNESS, MOVED, REACH, SCALE, SOFTENS
+from rtcomp.physics.yielding import neared
 
 
 @effect_kernel
 def dahl(p: Floats, s: Floats, w: Floats) -> None:
-    """p: stiffness, coulomb, exponent i; s: force (N).
-
-    In u = 1 - F sgn(v) / Fc the equation is du/d|x| = -(k / Fc) |u|^i sgn(u), which has a closed form for
-    every i; so a displacement of any size is exact.
-    """
+    """p: stiffness, coulomb, exponent i; s: force (N)."""
     moved = w[MOVED]
     if moved != 0.0:
         level = p[1] * w[REACH]
         direction = math.copysign(1.0, moved)
-        gap = 1.0 - s[0] * direction / level
-        travel = p[0] / level * abs(moved)
-        size = abs(gap)
-        if p[2] == 1.0:
-            left = size * math.exp(-travel)
-        elif size < 1e-200:  # settled; its powers would leave the range of floats
-            left = 0.0
-        else:
-            # Relative to the starting gap, so that no power of a tiny gap overflows.
-            shrink = 1.0 - (1.0 - p[2]) * travel * math.exp((p[2] - 1.0) * math.log(size))
-            left = size * math.exp(math.log(shrink) / (1.0 - p[2])) if shrink > 0.0 else 0.0
-        s[0] = direction * level * (1.0 - math.copysign(left, gap))
+        gap, travel = 1.0 - s[0] * direction / level, p[0] / level * abs(moved)
+        s[0] = direction * level * (1.0 - neared(gap, travel, p[2]))
     w[GRIP] = softened(s[0], p[1] * w[REACH], w[SOFTENS]) * w[SCALE]
     w[GRIP_LEVEL] = p[1]
     w[GRIP_STIFFNESS] = p[0]

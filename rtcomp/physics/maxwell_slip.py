@@ -1,24 +1,20 @@
-"""Maxwell-slip friction: a bank of stop elements in parallel. Rate-independent, with non-local memory."""
+"""Maxwell-slip friction: a bank of elements in parallel. Rate-independent, with non-local memory."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from rtcomp.kernels import Floats, compiled, effect_kernel, summing
+from rtcomp.kernels import Floats, effect_kernel, summing
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Parameter, Place
 from rtcomp.physics.lists import ListEffect
 from rtcomp.physics.softening import softened
 from rtcomp.physics.wires import FRICTION, GRIP, GRIP_LEVEL, GRIP_STIFFNESS, MOVED, REACH, SCALE, SOFTENS
+from rtcomp.physics.yielding import stretched, yielded
 
 STIFFNESS = Parameter("stiffness", "N/m", -1e12, 1e12, "spring of the element", physical_low=0.0)
+EXPONENT = Parameter("exponent", "1", 0.0, 10.0, "of Dahl's law by which elements yield; 0 is a stop", 0.0)
 REACH_M = Parameter("reach", "m", 0.0, 1e3, "travel at which the element yields", open_low=True)
-
-
-@compiled
-def stretched(deflection: float, moved: float, reach: float) -> float:
-    """Return the deflection (m) of a stop element after it was `moved`: exact, however far."""
-    return min(max(deflection + moved, -reach), reach)
 
 
 @summing
@@ -33,9 +29,16 @@ def _held(p: Floats, s: Floats, count: int, moved: float, longer: float) -> floa
 
 @effect_kernel
 def maxwell_slip(p: Floats, s: Floats, w: Floats) -> None:
-    """p: count, stiffnesses, reaches, level, whole stiffness; s: deflection (m) of each element."""
+    """p: count, stiffnesses, reaches, level, whole stiffness, exponent; s: deflection (m) of each element."""
     count, longer, softening = int(p[0]), w[REACH], w[SOFTENS]
-    force = _held(p, s, count, w[MOVED], longer)
+    exponent = p[3 + 2 * count]
+    if exponent == 0.0:
+        force = _held(p, s, count, w[MOVED], longer)
+    else:
+        force = 0.0
+        for i in range(count):
+            s[i] = yielded(s[i], w[MOVED], p[1 + count + i] * longer, exponent)
+            force += p[1 + i] * s[i]
     if softening != 0.0:
         force = 0.0
         for i in range(count):
@@ -48,15 +51,15 @@ def maxwell_slip(p: Floats, s: Floats, w: Floats) -> None:
 
 @register
 class MaxwellSlip(ListEffect):
-    """Stop elements in parallel; `elements` is a list of (stiffness N/m, reach m)."""
+    """Elements in parallel; `elements` is a list of (stiffness N/m, reach m), `exponent` how they yield."""
 
     name = "maxwell-slip"
     place = Place.FRICTION
-    parameters = ()
+    parameters = (EXPONENT,)
     element = (STIFFNESS, REACH_M)
     kernel = maxwell_slip
     says = "presliding hysteresis of springs and sliders in parallel; yielded, one pushes stiffness * reach"
-    equation = "F = sum k_i z_i,  z_i <- clip(z_i + dx, -r_i, r_i)"
+    equation = "F = sum k_i z_i,  dz_i/dx = |1 - z_i/r_i sgn(v)|^n sgn(1 - z_i/r_i sgn(v)); of n = 0 a stop"
     source = "Iwan (1966), J. Applied Mechanics 33(4); Lampaert, Swevers, Al-Bender (2002), IEEE TAC 47(4)"
     signature = (
         "closed hysteresis loops of force against position whose branches are the virgin curve doubled"
@@ -66,17 +69,22 @@ class MaxwellSlip(ListEffect):
     searchable = False
 
     def vector(self) -> Floats:
-        """Return count, stiffnesses, reaches, level (N) and the stiffness of all elements (N/m)."""
+        """Return count, stiffnesses, reaches, level (N), the stiffness of all elements (N/m), exponent."""
         stiffness, reach = zip(*self.elements, strict=True)
-        return np.array([len(self.elements), *stiffness, *reach, self.level, sum(stiffness)])
+        return np.array([len(self.elements), *stiffness, *reach, self.level, sum(stiffness), self.exponent])
 
     def initial_state(self) -> Floats:
         """Return the elements' deflections, all relaxed."""
         return np.zeros(len(self.elements))
 
     def stiffness(self) -> float:
-        """Return the stiffness with every element sticking (N/m)."""
-        return float(sum(abs(k) for k, _ in self.elements))
+        """Return the stiffness just after a reversal out of sliding (N/m)."""
+        return float(2.0**self.exponent * sum(abs(k) for k, _ in self.elements))
+
+    @property
+    def exponent(self) -> float:
+        """Exponent of the law by which elements yield."""
+        return float(self.values["exponent"])
 
     @property
     def level(self) -> float:

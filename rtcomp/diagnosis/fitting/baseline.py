@@ -14,6 +14,7 @@ from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.fitting.law import law_of
 from rtcomp.diagnosis.fitting.replicated import replicated
 from rtcomp.diagnosis.fitting.timing import put_in_step
 from rtcomp.diagnosis.forces.balance import ForceBalance
@@ -121,9 +122,18 @@ def settle(fitter: Fitter, terms: Sequence[Term] = (), ends: float = math.inf) -
 
     As far as the time `ends` (clock.now) allows: each is begun only before.
     """
-    for step in (_put_grid, _smooth, partial(_damp, ends=ends), put_in_step):
+    for step in (_put_friction, _smooth, partial(_damp, ends=ends), put_in_step):
         if fitter.by_force and clock.now() < ends:
             step(fitter, terms)
+
+
+def _put_friction(fitter: Fitter, terms: Sequence[Term]) -> None:
+    """Put yield displacements, and the law by which friction yields there, to what `terms` have."""
+    _put_grid(fitter, terms)
+    exponent = law_of(fitter, terms)
+    if exponent != fitter.balance.exponent:
+        fitter.balance.exponent = exponent
+        _put_grid(fitter, terms)
 
 
 def _smooth(fitter: Fitter, terms: Sequence[Term]) -> None:

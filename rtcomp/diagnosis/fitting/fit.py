@@ -190,7 +190,9 @@ class Fitter:
         def of(c: Floats) -> Floats:
             elements = list(zip(c[b.friction], b.reaches, strict=True))
             own = sign * ent.all_amounts(self.believed_as(model, c) if effects else [])
-            return np.array([*c[: len(BASE)], *level_and_reach(elements, c[b.model] * b.models), *own])
+            return np.array(
+                [*c[: len(BASE)], *level_and_reach(elements, c[b.model] * b.models, b.exponent), *own]
+            )
 
         return of(model.coefficients), np.array([of(c) for c in model.without]), sizes
 

@@ -11,12 +11,15 @@ from rtcomp.diagnosis.forces.models import levels
 from rtcomp.diagnosis.result import Retuned, Value
 from rtcomp.kernels import Floats
 from rtcomp.physics.maxwell_slip import MaxwellSlip
+from rtcomp.physics.yielding import yielded
 from rtcomp.stage.stage import Stage
 from rtcomp.units import for_axis, power_of
 
 MOVED = 0.02
 """Relative change of a parameter that is worth reporting."""
 NONE = np.zeros(0)
+CURVE = 200
+"""Points of a virgin curve that is not straight between the reaches of its elements."""
 FREEDOM, WIDE = 9, 2.262
 """Degrees of freedom of about ten blocks, and standard deviations of a 95 % interval from them (Student)."""
 
@@ -77,23 +80,37 @@ def widening(clear: Floats, family: int) -> float:
     return np.inf
 
 
-def level_and_reach(elements: Sequence[Sequence[float]], models: Floats = NONE) -> tuple[float, float]:
+def level_and_reach(
+    elements: Sequence[Sequence[float]], models: Floats = NONE, exponent: float = 0.0
+) -> tuple[float, float]:
     """Return friction.level (N, sum of yield forces) and friction.reach (m, travel to half of it).
 
-    An element is its stiffness (N/m) and its reach (m). Beside `models` of friction, by their levels (N),
-    there is no reach: 0.
+    An element is its stiffness (N/m) and its reach (m), and yields by Dahl's law of an `exponent`. Beside
+    `models` of friction, by their levels (N), there is no reach: 0.
     """
     k, r = np.array([e[0] for e in elements]), np.array([e[1] for e in elements])
     level = float(np.sum(k * r))
     travel = np.concatenate([[0.0], np.sort(r)])
-    force = np.array([float(np.sum(k * np.minimum(x, r))) for x in travel])
+    if exponent != 0.0:  # curved between them
+        travel = np.append(0.0, np.geomspace(0.1 * travel[1], travel[-1], CURVE))
+    force = np.array(
+        [sum(a * yielded(0.0, x, b, exponent) for a, b in zip(k, r, strict=True)) for x in travel]
+    )
     reach = 0.0 if models.size else float(np.interp(0.5 * level, force, travel))
     return level + float(np.sum(models)), reach
+
+
+def law(believed: Stage, found: Stage) -> list[Retuned]:
+    """Return the law by which friction yields, where that found is another than the believed one."""
+    before, after = (
+        s.friction.exponent if isinstance(s.friction, MaxwellSlip) else 0.0 for s in (believed, found)
+    )
+    return [] if before == after else [Retuned("friction.exponent", before, Value(after, after, after, "1"))]
 
 
 def believed_friction(stage: Stage) -> tuple[float, float]:
     """Return friction.level (N) and friction.reach (m) of the belief; 0 where it has none."""
     friction = stage.friction
     if isinstance(friction, MaxwellSlip):
-        return level_and_reach(friction.elements)
+        return level_and_reach(friction.elements, exponent=friction.exponent)
     return float(np.sum(levels(stage))), 0.0

@@ -48,16 +48,12 @@ def stage_of(balance: ForceBalance, fitted: Fitted, *, between: bool = False) ->
     level = stiffness * reaches
     force = float(np.sqrt(np.mean(np.concatenate([s.voltage for s in balance.data.segments]) ** 2)))
     least = SLIGHT * max(float(level.max()), force * balance.stage.force_constant)
-    units = [
-        {"stiffness": float(k), "reach": float(r)}
-        for k, r, f in zip(stiffness, reaches, level, strict=True)
-        if f > least
-    ]
+    units = [(float(k), float(r)) for k, r, f in zip(stiffness, reaches, level, strict=True) if f > least]
     kept = [float(factor) for factor in c[balance.model] if factor > SLIGHT]
     model = [friction_in("N", data["stage"]["friction"], factor) for factor in kept]
     mechanics.pop("friction", None)
     if model or units:
-        mechanics["friction"] = model[0] if model else units
+        mechanics["friction"] = model[0] if model else bank(units, balance.exponent)
     believed: list[Entry] = []
     at = iter(fitted.system.of_entry)
     refitted = {id(e): next(at) for e in balance.believed}
@@ -67,7 +63,8 @@ def stage_of(balance: ForceBalance, fitted: Fitted, *, between: bool = False) ->
         believed.append(dict(entry) if span is None else ent.composed(entry, c[span]))
     offset = float(c[balance.size - 1])
     constant: list[Entry] = [bias_entry(-offset)] if offset != 0.0 else []
-    besides: list[Entry] = [{"name": MaxwellSlip.name, "elements": units}] if model and units else []
+    stops: Entry = {"name": MaxwellSlip.name, "elements": bank(units, 0.0)}
+    besides = [stops] if model and units else []
     effects = merged([*believed, *constant, *fitted.entries, *besides])
     mechanics["effects"] = effects
     if not effects:
@@ -95,6 +92,14 @@ def in_units(stage: Stage, unit: str, factor: float) -> Stage:
     if effects:
         changed["stage"]["effects"] = [_in_units(e, unit, factor) for e in effects]
     return Stage.from_dict(changed)
+
+
+def bank(elements: Sequence[tuple[float, ...]], exponent: float) -> Any:
+    """Return elements (N/m, m) as friction of a stage file, yielding by Dahl's law; of 0, stops."""
+    units = [{"stiffness": float(k), "reach": float(r)} for k, r in elements]
+    if exponent == 0.0:
+        return units
+    return {"model": MaxwellSlip.name, "exponent": exponent, "elements": units}
 
 
 def friction_in(unit: str, friction: Any, factor: float) -> Any:

@@ -18,7 +18,7 @@ from rtcomp.diagnosis.forces.models import own_models
 from rtcomp.kernels import Floats, compiled, summing
 from rtcomp.physics import Effect
 from rtcomp.physics.closing import ClosingBranches
-from rtcomp.physics.maxwell_slip import MaxwellSlip, stretched
+from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.physics.program import Program, renew, run_chain
 from rtcomp.physics.softening import softened
 from rtcomp.physics.speed import MicroDamping, ViscousFriction
@@ -34,6 +34,7 @@ from rtcomp.physics.wires import (
     SCALE,
     SOFTENS,
 )
+from rtcomp.physics.yielding import stretched, yielded
 from rtcomp.stage.balance import along_row, around_rows, parts_of
 from rtcomp.stage.stage import Stage
 
@@ -57,6 +58,7 @@ def units_along(
     least_parts: int = 1,
     sizes: Floats | None = None,
     larger: tuple[float, float] = AS_IT_IS,
+    exponent: float = 0.0,
 ) -> Floats:
     """Return the force (N) of each unit around the rows of a motion, (K, 3 + models + reaches).
 
@@ -66,7 +68,8 @@ def units_along(
     `weights` (N/m) of the elements make the friction at hand; what asks for the whole of it finds its
     stiffness and its level so many times `larger`. `start` (m) are the deflections of the elements before
     the motion, nothing where it is not given. `drive` effects only tell the load. A row is cut into
-    `least_parts`, or more where an effect needs it.
+    `least_parts`, or more where an effect needs it. Elements yield by Dahl's law of an `exponent`: 0, at
+    their reach at once.
     """
     below = stage.mechanics.micro_damping_speed
     units: list[Effect] = [
@@ -100,7 +103,7 @@ def units_along(
     _along(
         program.steps, program.p, program.s, w, base, motion, parts, smooth, whole, len(before), len(own),
         len(bent),
-        *larger, weights, reaches, deflection, sizes is not None, times, out, mean,
+        *larger, weights, reaches, exponent, deflection, sizes is not None, times, out, mean,
     )  # fmt: skip
     found = around_rows(out) if parts == 1 else mean
     if smooth:
@@ -110,13 +113,13 @@ def units_along(
 
 
 @compiled
-def deflections(position: Floats, reaches: Floats) -> Floats:
-    """Return the deflections (m, (N,)) of stop elements after a motion (m, (K,)), from nothing."""
+def deflections(position: Floats, reaches: Floats, exponent: float) -> Floats:
+    """Return the deflections (m, (N,)) of elements after a motion (m, (K,)), from nothing."""
     found = np.zeros(reaches.size)
     for k in range(1, position.size):
         moved = position[k] - position[k - 1]
         for i in range(reaches.size):
-            found[i] = stretched(found[i], moved, reaches[i])
+            found[i] = yielded(found[i], moved, reaches[i], exponent)
     return found
 
 
@@ -138,6 +141,7 @@ def _along(
     higher: float,
     weights: Floats,
     reaches: Floats,
+    exponent: float,
     deflection: Floats,
     summed: bool,
     times: Floats,
@@ -177,12 +181,12 @@ def _along(
                     here[i] = w[FRICTION]
             believed, its_level, its_stiffness = _believed(steps, p, s, w, first + SPEED_UNITS, own)
             asked = 0.0
-            if summed and w[SOFTENS] == 0.0:  # nobody asks what each element holds
+            if summed and w[SOFTENS] == exponent == 0.0:  # nobody asks what each element holds
                 moved, longer = w[MOVED], w[REACH]
                 total, asked = _stretched_sums(moved, longer, reaches, deflection, weights, times)
                 total, asked = total * w[SCALE], asked * w[SCALE]
             else:
-                _stretch(w[MOVED], w[REACH], w[SCALE], w[SOFTENS], reaches, deflection, held)
+                _stretch(w[MOVED], w[REACH], w[SCALE], w[SOFTENS], reaches, exponent, deflection, held)
                 total = _total(weights, held) if whole else 0.0
                 asked = _total(times, held) if summed else 0.0
             grown = 1.0
@@ -252,13 +256,18 @@ def _stretched_sums(
 
 @compiled
 def _stretch(
-    moved: float, longer: float, scale: float, softening: float, reaches: Floats, deflection: Floats,
-    held: Floats,
+    moved: float, longer: float, scale: float, softening: float, reaches: Floats, exponent: float,
+    deflection: Floats, held: Floats,
 ) -> None:  # fmt: skip
-    """Move the stop elements on: their `deflection` (m), and what they hold by it."""
-    for i in range(reaches.size):
-        deflection[i] = stretched(deflection[i], moved, reaches[i] * longer)
-        held[i] = deflection[i] * scale
+    """Move the elements on: their `deflection` (m), and what they hold by it."""
+    if exponent == 0.0:
+        for i in range(reaches.size):
+            deflection[i] = stretched(deflection[i], moved, reaches[i] * longer)
+            held[i] = deflection[i] * scale
+    else:
+        for i in range(reaches.size):
+            deflection[i] = yielded(deflection[i], moved, reaches[i] * longer, exponent)
+            held[i] = deflection[i] * scale
     if softening != 0.0:
         for i in range(reaches.size):
             held[i] = softened(deflection[i], reaches[i] * longer, softening) * scale

@@ -13,6 +13,7 @@ from rtcomp.kernels import Floats, compiled
 from rtcomp.physics import Effect, wires
 from rtcomp.physics.coupled import contact
 from rtcomp.physics.program import COUNT, Program, run_chain
+from rtcomp.physics.yielding import yielded
 
 FINE = 0.3
 """Longest sub-step (rad) of the load's oscillation behind a play."""
@@ -27,8 +28,10 @@ class Load:
     micro_damping: float
     micro_speed: float
     stiffness: Floats
-    """(n,) N/m of stop elements, with `reaches` (n,) m."""
+    """(n,) N/m of elements, with `reaches` (n,) m."""
     reaches: Floats
+    exponent: float = 0.0
+    """Of the law by which they yield."""
 
 
 @dataclass(frozen=True)
@@ -71,15 +74,15 @@ def behind_play(
     w[wires.STEP] = period / parts
     return _drawn(
         x, period / parts, parts, gap, omega, load.mass, load.viscous, load.micro_damping, load.micro_speed,
-        load.stiffness, load.reaches, program.steps, program.p, program.s, w,
+        load.stiffness, load.reaches, load.exponent, program.steps, program.p, program.s, w,
     )  # fmt: skip
 
 
 @compiled
 def _drawn(
     x: Floats, h: float, parts: int, gap: float, omega: float, mass: float, viscous: float, micro: float,
-    micro_speed: float, stiffness: Floats, reaches: Floats, steps: np.ndarray, p: Floats, s: Floats,
-    w: Floats,
+    micro_speed: float, stiffness: Floats, reaches: Floats, exponent: float, steps: np.ndarray, p: Floats,
+    s: Floats, w: Floats,
 ) -> Floats:  # fmt: skip
     out = np.empty_like(x)
     z = np.zeros_like(reaches)
@@ -103,7 +106,7 @@ def _drawn(
             u += h * (contact(y - at, u - base, gap, omega) + force / mass)
             u /= 1.0 + h * damping / mass
             for i in range(z.size):
-                z[i] = min(max(z[i] + h * u, -reaches[i]), reaches[i])
+                z[i] = yielded(z[i], h * u, reaches[i], exponent)
             y += h * u
         out[k] = y
     return out

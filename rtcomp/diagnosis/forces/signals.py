@@ -63,6 +63,8 @@ class Signals:
         friction = stage.friction
         self._elements = list(friction.elements) if isinstance(friction, MaxwellSlip) else []
         self.models = levels(stage)
+        self.exponent = friction.exponent if isinstance(friction, MaxwellSlip) else 0.0
+        """Of the law by which the friction units yield."""
         self._cache = Cache()
         m = stage.mechanics
         self.believed_speed = m.micro_damping_speed if m.micro_damping > 0.0 else None
@@ -260,7 +262,7 @@ class Signals:
         m, play, pushes = self.stage.mechanics, carried.play.values, carried.pushes
         load = Load(
             play["share"] * m.mass, m.viscous, m.micro_damping, m.micro_damping_speed, carried.weights,
-            self.reaches,
+            self.reaches, self.exponent,
         )  # fmt: skip
 
         def path(s: Segment, p: Path) -> Path:
@@ -302,7 +304,7 @@ class Signals:
             times = times[some] if times is not None else None
         return units_along(
             self.stage, list(before), list(modifiers), reaches, held, np.ascontiguousarray(motion),
-            self.grain, start, PARTS, times, larger,
+            self.grain, start, PARTS, times, larger, self.exponent,
         )  # fmt: skip
 
     def _start(self, segment: Segment, sensors: Sequence[Effect]) -> Floats:
@@ -310,7 +312,11 @@ class Signals:
 
         def made() -> list[Floats]:
             way = way_there(segment, sensors)
-            return [np.zeros(self.reaches.size) if way is None else deflections(way[1], self.reaches)]
+            return [
+                np.zeros(self.reaches.size)
+                if way is None
+                else deflections(way[1], self.reaches, self.exponent)
+            ]
 
         key = ("start", float(segment.time[0]), segment.time.size, key_of(sensors))
         return np.asarray(self._cache.of(key, made)[0])

@@ -8,6 +8,9 @@ import numpy as np
 
 from rtcomp.kernels import Floats, compiled, summing
 
+ROUNDS = 5
+"""Changes of the active set that may leave no fewer members wrong than before."""
+
 
 @summing
 def _product(one: Floats, other: Floats, count: int) -> float:
@@ -105,39 +108,36 @@ def _stepwise(gram: Floats, cross: Floats, low: Floats, high: Floats, tolerance:
 def bounded_minimum(gram: Floats, cross: Floats, low: Floats, high: Floats) -> Floats:
     """Minimise c' G c / 2 - h' c within bounds by an active set (Portugal, Judice, Vicente 1994).
 
-    The set changes as a whole at first and by single members when that would cycle. Where columns are so
-    alike that this does not end, it goes down step by step.
+    The set changes as a whole. Where columns are so alike that fewer and fewer members being wrong is not
+    what comes of it, it goes down step by step.
     """
     size = cross.size
     state = np.zeros(size, dtype=np.int8)  # 0 free, -1 at low, 1 at high
     wrong = np.zeros(size, dtype=np.int8)
-    best, rounds = size + 1, 5
+    best, rounds = size + 1, ROUNDS
     most = 0.0
     for i in range(size):
         most = max(most, abs(cross[i]))
     tolerance = 1e-10 * (most + 1.0)
     c = np.zeros(size)
-    for _ in range(20 * size):
+    while rounds > 0:
         for i in range(size):
             if state[i] != 0:
                 c[i] = low[i] if state[i] < 0 else high[i]
         _free(gram, cross, state, c)
-        count = last = 0
+        count = 0
         for i in range(size):
             slope = _product(gram[i], c, size) - cross[i]
             wrong[i] = _wrong(state[i], c[i], slope, low[i], high[i], tolerance)
             if wrong[i] != 0:
-                count, last = count + 1, i
+                count += 1
         if count == 0:
             return c
-        single = False
         if count < best:
-            best, rounds = count, 5
-        elif rounds > 0:
-            rounds -= 1
+            best, rounds = count, ROUNDS
         else:
-            single = True
+            rounds -= 1
         for i in range(size):
-            if wrong[i] != 0 and (i == last or not single):
+            if wrong[i] != 0:
                 state[i] = 0 if wrong[i] == 2 else wrong[i]
     return _stepwise(gram, cross, low, high, tolerance)

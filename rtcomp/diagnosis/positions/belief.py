@@ -11,12 +11,13 @@ import numpy as np
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.entries import Entry
-from rtcomp.diagnosis.fitting.retuned import level_and_reach
-from rtcomp.diagnosis.fitting.stage_of import merged
+from rtcomp.diagnosis.fitting.retuned import believed_friction
+from rtcomp.diagnosis.fitting.stage_of import bank, merged
 from rtcomp.diagnosis.forces.signals import BASE
 from rtcomp.diagnosis.numerics.regression import Prior
 from rtcomp.diagnosis.settings import BELIEF_SD
 from rtcomp.kernels import Floats
+from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.stage.stage import Stage
 
 LEVEL, REACH = "level", "reach"
@@ -49,7 +50,8 @@ class Belief:
         found = [Number(n, 0.0, near=True) for n in BASE if float(getattr(m, n)) > 0.0]
         if m.micro_damping > 0.0:
             found.append(Number("micro_damping_speed", 0.0, near=True))
-        if isinstance(m.friction, list):
+        self.friction = stage.friction if isinstance(stage.friction, MaxwellSlip) else None
+        if self.friction is not None:
             found += [Number(LEVEL, 0.0, near=False), Number(REACH, 0.0, near=False)]
         for i, size in enumerate(self.sizes.tolist()):
             found.append(Number("size", abs(size) or 0.1 * force, near=size != 0.0, at=i))
@@ -76,11 +78,9 @@ class Belief:
                 m[number.name] *= math.exp(value)
             else:
                 sizes[number.at] += value * number.scale
-        if isinstance(m.get("friction"), list):
-            m["friction"] = [
-                {"stiffness": e["stiffness"] * level / reach, "reach": e["reach"] * reach}
-                for e in m["friction"]
-            ]
+        if self.friction is not None:
+            moved = [(k * level / reach, r * reach) for k, r in self.friction.elements]
+            m["friction"] = bank(moved, self.friction.exponent)
         at, effects = 0, []
         for entry in m.get("effects", []):
             mine = dict(entry)
@@ -101,9 +101,8 @@ class Belief:
 
         Those with the sign that is believed.
         """
-        m = self.moved(c, []).mechanics
-        friction = m.friction if isinstance(m.friction, list) else []
-        held = level_and_reach([(e.stiffness, e.reach) for e in friction]) if friction else (0.0, 0.0)
+        stage = self.moved(c, [])
+        m, held = stage.mechanics, believed_friction(stage)
         own = ent.all_amounts([dict(e) for e in m.effects if is_sized(dict(e))])[: amounts.size]
         sign = np.where(amounts < 0.0, -1.0, 1.0)
         return np.array([*(float(getattr(m, n)) for n in BASE), *held, *(sign * own)])

@@ -21,6 +21,7 @@ from rtcomp.diagnosis.fitting.fit import STEPS, Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted, left_out
 from rtcomp.diagnosis.fitting.free import Free, Term, all_free_of, changed, slopes
 from rtcomp.diagnosis.fitting.other_forms import overtones
+from rtcomp.diagnosis.fitting.stage_of import bank
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.forces.replicate import replicate
 from rtcomp.diagnosis.numerics.regression import Grams, Prior, System
@@ -126,12 +127,15 @@ class Trajectory(Fitter):
         """See `Fitter`: each element of the believed friction stiffer by what a belief is off."""
         stage = self.stage(model)
         friction = stage.friction
-        elements = friction.elements if isinstance(friction, MaxwellSlip) else []
-        listed = [{"stiffness": stiffness, "reach": reach} for stiffness, reach in elements]
+        listed: list[tuple[float, ...]] = []
+        exponent = 0.0
+        if isinstance(friction, MaxwellSlip):
+            listed, exponent = friction.elements, friction.exponent
 
         def one(i: int) -> Floats:
-            stiffer = {**listed[i], "stiffness": listed[i]["stiffness"] * (1.0 + STEP)}
-            other = stage.with_changes(stage={"friction": [*listed[:i], stiffer, *listed[i + 1 :]]})
+            stiffer = (listed[i][0] * (1.0 + STEP), listed[i][1])
+            changed = bank([*listed[:i], stiffer, *listed[i + 1 :]], exponent)
+            other = stage.with_changes(stage={"friction": changed})
             return (model.residual - self._bent(self.windows.off(other))) * (BELIEF_SD / STEP)
 
         none = np.zeros((0, model.residual.size))

@@ -13,7 +13,7 @@ from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.intervals import Told, believed_sizes, numbers, told
 from rtcomp.diagnosis.fitting.other_forms import any_laws, errors_beside, in_any_form
-from rtcomp.diagnosis.fitting.retuned import Numbers, retunings
+from rtcomp.diagnosis.fitting.retuned import Numbers, law, retunings
 from rtcomp.diagnosis.fitting.stage_of import in_units, with_effect
 from rtcomp.diagnosis.fitting.unbiased import unbiased
 from rtcomp.diagnosis.forces.balance import ForceBalance
@@ -203,7 +203,8 @@ def _stages(
         else:
             stages, moved = changed, [force_constant(believed, cause)]
     moved = [*retunings(tuned, believed.axis), *moved]
-    return stages, moved + _found(fitter.balance, believed, tuned)
+    moved += [*_found(fitter.balance, believed, tuned), *law(believed, stages["after"])]
+    return stages, moved
 
 
 def _found(balance: ForceBalance, believed: Stage, tuned: Numbers) -> list[Retuned]:
