@@ -266,7 +266,8 @@ def _resettled(
     parents.update({id(new): parents[id(old)] for new, old in zip(again, beam, strict=True)})
     near = [g for g in sorted(grown, key=score) if all(g is not m for m in beam)]
     near = [g for g in near if score(g) < score(beam[0]) + NEAR][:BEAM]
-    return sorted(again, key=score), [*again, *_refitted(fitter, near)]
+    # On its own friction an effect may go to a bound that it kept away from on a poorer one.
+    return sorted(again, key=lambda m: (m.at_bound, score(m))), [*again, *_refitted(fitter, near)]
 
 
 def _refitted(fitter: Fitter, models: Sequence[Fitted]) -> list[Fitted]:

@@ -1,0 +1,49 @@
+"""The law by which friction yields is that of the recording, whichever is believed, also beside an effect."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from recorded import STAGE, run, stage, there_and_back
+
+from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.retuned import level_and_reach
+from rtcomp.diagnosis.fitting.stage_of import bank
+from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.pipeline import diagnose
+from rtcomp.diagnosis.recordings.data import load_data
+from rtcomp.physics.maxwell_slip import MaxwellSlip
+
+ELEMENTS = [(e["stiffness"], e["reach"]) for e in STAGE["stage"]["friction"]]
+
+
+@pytest.mark.parametrize("believed", [0.0, 1.0])
+@pytest.mark.parametrize("true", [0.0, 1.0])
+def test_it_is_that_of_the_recording(believed: float, true: float) -> None:
+    recording = run(stage(friction=bank(ELEMENTS, true)), there_and_back(8.0))
+    balance = ForceBalance(stage(friction=bank(ELEMENTS, believed)), load_data([recording]))
+    base, fitter = baseline(balance), Fitter(balance)
+    assert balance.exponent == true
+    assert fitter.relative(base, seen=True) < 0.01
+    written = fitter.stage(base).friction
+    assert isinstance(written, MaxwellSlip) and written.exponent == true
+    assert written.level == pytest.approx(sum(k * r for k, r in ELEMENTS), rel=0.05)
+
+
+@pytest.mark.slow
+def test_beside_an_effect_it_is_told_and_the_effect_named() -> None:
+    hidden = {"name": "parallel-spring", "stiffness": 4000.0}
+    recording = run(stage(friction=bank(ELEMENTS, 1.0), effects=[hidden]), there_and_back(12.0))
+    found = diagnose(stage(), [recording], budget=120.0)
+    assert [e.names for e in found.effects] == [("parallel-spring",)]
+    assert ("friction.exponent", 0.0, 1.0) in [(r.parameter, r.before, r.after.value) for r in found.retuned]
+    assert found.fit.after < 0.01 < found.fit.retuned
+    assert isinstance(found.stage.friction, MaxwellSlip) and found.stage.friction.exponent == 1.0
+
+
+@pytest.mark.parametrize(("exponent", "travel"), [(0.0, 0.5), (1.0, np.log(2.0)), (2.0, 1.0)])
+def test_the_travel_to_half_of_the_level_is_that_of_the_virgin_curve(exponent: float, travel: float) -> None:
+    level, reach = level_and_reach([(2e5, 4e-6)], exponent=exponent)
+    assert level == pytest.approx(0.8)
+    assert reach == pytest.approx(travel * 4e-6, rel=1e-3)
