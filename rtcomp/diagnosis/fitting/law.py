@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.numerics.significance import log_gain
 from rtcomp.diagnosis.settings import LEAST_GAIN, NEGLIGIBLE
 
-LAWS = (0.0, 1.0)
-"""Exponents of Dahl's law: a stop, which yields at its reach at once, and a solid that nears its level."""
+STOP, SOLID = 0.0, 1.0
+"""Exponents of Dahl's law: of a stop, which yields at its reach at once, and of a solid that nears it."""
+RANGE, SETTLED = (0.25, 3.0), 0.02
+"""Exponents of a solid, and how well the best of them is found."""
 
 
 def law_of(fitter: Fitter, terms: Sequence[Term]) -> float:
@@ -19,15 +22,28 @@ def law_of(fitter: Fitter, terms: Sequence[Term]) -> float:
     Less by what an effect must gain to matter. A believed model of friction has its own law.
     """
     balance = fitter.balance
-    model = fitter.fit(terms, steps=0)
-    if balance.models.size or not model.coefficients[balance.friction].any():
+    at_hand = fitter.fit(terms, steps=0)
+    if balance.models.size or not at_hand.coefficients[balance.friction].any():
         return balance.exponent
-    for exponent in LAWS:
-        if exponent != balance.exponent:
-            other = fitter.on(balance.data)
-            other.balance.exponent = exponent
-            there = other.fit(terms, steps=0)
-            less = fitter.relative(model, seen=True) ** 2 - other.relative(there, seen=True) ** 2
-            if log_gain(model.errors, there.errors) > 2.0 * LEAST_GAIN and less > NEGLIGIBLE**2:
-                return exponent
-    return balance.exponent
+
+    def by(exponent: float) -> tuple[Fitter, Fitted]:
+        other = fitter.on(balance.data)
+        other.balance.exponent = exponent
+        return other, other.fit(terms, steps=0)
+
+    def less(other: Fitter, model: Fitted) -> bool:
+        gained = fitter.relative(at_hand, seen=True) ** 2 - other.relative(model, seen=True) ** 2
+        return log_gain(at_hand.errors, model.errors) > 2.0 * LEAST_GAIN and gained > NEGLIGIBLE**2
+
+    if balance.exponent != STOP and less(*by(STOP)):
+        return STOP
+    if balance.exponent == STOP and not less(*by(SOLID)):
+        return STOP
+    from scipy.optimize import minimize_scalar
+
+    best = minimize_scalar(
+        lambda exponent: -log_gain(at_hand.errors, by(exponent)[1].errors),
+        bounds=RANGE, method="bounded", options={"xatol": SETTLED},
+    )  # fmt: skip
+    exponent = float(best.x)
+    return exponent if less(*by(exponent)) else balance.exponent

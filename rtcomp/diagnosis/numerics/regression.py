@@ -16,7 +16,7 @@ RIDGE = 1e-9
 FREEDOM = 4.0
 """Degrees of freedom of what is believed (Student's t): near the belief as Gauss has it, and a number that is
 far off, a guess of a hundredth, costs little more than one that is off by a few of its deviations."""
-RELAXED, SETTLED = 20, 0.01
+RELAXED, SETTLED = 20, 1e-3
 """Solutions with precisions of the one before, at most; relative change at which they are settled."""
 
 
@@ -42,6 +42,10 @@ class Prior:
         """Return the prior of Gauss that pulls coefficients `c` as Student's t does (Lange et al. 1989)."""
         off = self.precision * (c - self.mean) ** 2
         return Prior(self.mean, self.precision * FREEDOM / (FREEDOM + off), self.low, self.high)
+
+    def charge(self, c: Floats) -> float:
+        """Return what coefficients cost by what is believed, as squared errors over their variance."""
+        return float(np.sum(FREEDOM * np.log1p(self.precision * (c - self.mean) ** 2 / FREEDOM)))
 
     def extended(self, count: int) -> Prior:
         """Return the prior with so many further coefficients, of which nothing is known."""
