@@ -28,7 +28,7 @@ UNITS = {
     "viscous": "N s/m",
     "micro_damping": "N s/m; force = micro_damping * exp(-(v / micro_damping_speed)^2) * v",
     "micro_damping_speed": "m/s",
-    "friction": "stop elements: stiffness N/m, reach m",
+    "friction": "elements: stiffness N/m, reach m, or a model by its name",
     "sensor": "m rms, m",
     "controller": "V/m, V/(m s), V s/m",
     "rate": "Hz",
