@@ -15,6 +15,7 @@ from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting.baseline import baseline, settle, with_offset
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
+from rtcomp.diagnosis.fitting.retuned import EXPONENT
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.forces.noise import Noise
 from rtcomp.diagnosis.forces.sticking import untold
@@ -51,6 +52,10 @@ BAND_LIMITED = "the command is taken as band-limited between rows, which fits be
 EARLY = (
     "the command acts {:.2g} ms before its row: what was read belongs to a later time than it says, or a "
     "simulation moves before it is pushed; that is no physics, and taken so"
+)
+LAW = (
+    "friction yields by another law than believed: of exponent 0 at the reach of an element at once, of 1 as "
+    "Dahl's solid, which nears its level"
 )
 Located = Callable[[float, Sequence[Place]], None]
 """Told, before anything is named, what part of the force the refitted stage leaves open (rms), and where."""
@@ -124,6 +129,7 @@ def _diagnosed(
     notes = [BAND_LIMITED] if len(objectives) > 1 and not fitter.balance.data.held else []
     early = fitter.balance.data.early * fitter.balance.data.period
     notes += [EARLY.format(1e3 * early)] if early else []
+    notes += [LAW] if any(r.parameter == EXPONENT for r in done.retuned) else []
     if done.position is not None:
         notes.append(STICKS.format(100.0 * untold(balance), done.position.seconds))
     compiling = clock.compiling() - compiling

@@ -18,6 +18,7 @@ from rtcomp.units import for_axis, power_of
 MOVED = 0.02
 """Relative change of a parameter that is worth reporting."""
 NONE = np.zeros(0)
+EXPONENT = "friction.exponent"
 CURVE = 200
 """Points of a virgin curve that is not straight between the reaches of its elements."""
 FREEDOM, WIDE = 9, 2.262
@@ -105,7 +106,7 @@ def law(believed: Stage, found: Stage) -> list[Retuned]:
     before, after = (
         s.friction.exponent if isinstance(s.friction, MaxwellSlip) else 0.0 for s in (believed, found)
     )
-    return [] if before == after else [Retuned("friction.exponent", before, Value(after, after, after, "1"))]
+    return [] if before == after else [Retuned(EXPONENT, before, Value(after, after, after, "1"))]
 
 
 def believed_friction(stage: Stage) -> tuple[float, float]:
