@@ -21,10 +21,10 @@ SLIDES = 1e-3
 def larger_by(signals: Signals, effect: Effect) -> list[Floats]:
     """Return the part by which friction is larger beside an effect, (K,) a segment; 0 where it sticks.
 
-    Measured on friction that slides at 1 N and hardly ever sticks.
+    Measured on friction that hardly ever sticks, of 1 N/m: of 1 N, it would be stiffer than any stage is.
     """
     reach = SLIDES * signals.grain
-    sliding: list[Effect] = [MaxwellSlip([(1.0 / reach, reach)])]
+    sliding: list[Effect] = [MaxwellSlip([(1.0, reach)])]
     found = []
     for segment, path in zip(signals.data.segments, signals.paths(), strict=True):
         motion = segment.time, path.x, path.v, path.a, signals.given(segment)
@@ -32,5 +32,5 @@ def larger_by(signals: Signals, effect: Effect) -> list[Floats]:
             np.abs(forces(signals.stage, chain, *motion, signals.grain).friction)
             for chain in ([effect, *sliding], sliding)
         ]
-        found.append(held[0] - held[1])
+        found.append((held[0] - held[1]) / reach)
     return found

@@ -107,9 +107,11 @@ def test_what_goes_by_nothing_of_its_own_has_one_law(entry: dict[str, Any]) -> N
     assert not fitter.variants(fitter.fit([Term.of(entry)], base), 0).size
 
 
-def test_friction_is_larger_by_as_much_as_an_effect_makes_it() -> None:
+@pytest.mark.parametrize("noise", [1.5e-8, 3e-10])
+def test_friction_is_larger_by_as_much_as_an_effect_makes_it(noise: float) -> None:
     """Where it slides, whatever friction the stage has: here by what the level of Stribeck's curve is."""
-    balance = ForceBalance(stage(), load_data([run(stage(), there_and_back(8.0))]))
+    axis = stage().with_changes(sensor={"noise": noise, "resolution": 0.0})
+    balance = ForceBalance(axis, load_data([run(axis, there_and_back(8.0))]))
     law = build({"name": "stribeck", "rise": 0.3, "velocity": 2e-3})
     (larger,), (path,) = larger_by(balance, law), balance.paths()
     fast = np.abs(path.v) > 2e-4
