@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rtcomp.diagnosis.forces.models import levels
+from rtcomp.diagnosis.forces.reaches import elements_of
 from rtcomp.diagnosis.result import Retuned, Value
 from rtcomp.kernels import Floats
-from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.physics.yielding import yielded
 from rtcomp.stage.stage import Stage
 from rtcomp.units import for_axis, power_of
@@ -103,15 +103,13 @@ def level_and_reach(
 
 def law(believed: Stage, found: Stage) -> list[Retuned]:
     """Return the law by which friction yields, where that found is another than the believed one."""
-    before, after = (
-        s.friction.exponent if isinstance(s.friction, MaxwellSlip) else 0.0 for s in (believed, found)
-    )
+    before, after = (elements_of(stage)[1] for stage in (believed, found))
     return [] if before == after else [Retuned(EXPONENT, before, Value(after, after, after, "1"))]
 
 
 def believed_friction(stage: Stage) -> tuple[float, float]:
     """Return friction.level (N) and friction.reach (m) of the belief; 0 where it has none."""
-    friction = stage.friction
-    if isinstance(friction, MaxwellSlip):
-        return level_and_reach(friction.elements, exponent=friction.exponent)
+    elements, exponent = elements_of(stage)
+    if elements:
+        return level_and_reach(elements, exponent=exponent)
     return float(np.sum(levels(stage))), 0.0

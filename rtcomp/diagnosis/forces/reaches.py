@@ -21,6 +21,12 @@ MOST_OWN = 10
 """Believed yield displacements up to which they are taken into the grid as they are."""
 
 
+def elements_of(stage: Stage) -> tuple[list[tuple[float, ...]], float]:
+    """Return the believed friction elements (N/m, m), and the exponent of the law by which they yield."""
+    friction = stage.friction
+    return (list(friction.elements), friction.exponent) if isinstance(friction, MaxwellSlip) else ([], 0.0)
+
+
 def grid(stage: Stage, data: Data, grain: float) -> Floats:
     """Return yield displacements (m) from the grain to an eighth of the stroke, the believed ones in it.
 
@@ -29,9 +35,8 @@ def grid(stage: Stage, data: Data, grain: float) -> Floats:
     low, high = data.stroke
     longest = LONGEST * (high - low)
     shortest = max(2.0 * grain, 1e-5 * longest)
-    friction = stage.friction
-    if isinstance(friction, MaxwellSlip):
-        own = [r for _, r in friction.elements]
+    own = [r for _, r in elements_of(stage)[0]]
+    if own:
         shortest = min(shortest, *own)
         longest = max(longest, min(BEYOND * max(own), YIELDS * (high - low)))
     return np.geomspace(min(shortest, 0.5 * longest), longest, GRID)

@@ -20,13 +20,12 @@ from rtcomp.diagnosis.forces.led import led_there, way_there
 from rtcomp.diagnosis.forces.models import levels
 from rtcomp.diagnosis.forces.noise import Noise
 from rtcomp.diagnosis.forces.play import Carried, Load, behind_play
-from rtcomp.diagnosis.forces.reaches import grid, on_grid
+from rtcomp.diagnosis.forces.reaches import elements_of, grid, on_grid
 from rtcomp.diagnosis.forces.sides import exact
 from rtcomp.diagnosis.numerics.spectrum import filtered
 from rtcomp.diagnosis.recordings.data import Data, Segment, behind_reading
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place, catalogue
-from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.stage.balance import around_rows, forces, parts_of_drive
 from rtcomp.stage.stage import Stage
 
@@ -60,11 +59,8 @@ class Signals:
         self.believed = [e for e in believed if ent.adds_force(ent.kind_of(e))]
         """Entries of the belief that add a force: their sizes are refitted with the base."""
         self._fixed = exact((ent.build(e) for e in believed if not ent.adds_force(ent.kind_of(e))), data.held)
-        friction = stage.friction
-        self._elements = list(friction.elements) if isinstance(friction, MaxwellSlip) else []
+        self._elements, self.exponent = elements_of(stage)
         self.models = levels(stage)
-        self.exponent = friction.exponent if isinstance(friction, MaxwellSlip) else 0.0
-        """Of the law by which the friction units yield."""
         self._cache = Cache()
         m = stage.mechanics
         self.believed_speed = m.micro_damping_speed if m.micro_damping > 0.0 else None

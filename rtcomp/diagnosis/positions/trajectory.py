@@ -23,6 +23,7 @@ from rtcomp.diagnosis.fitting.free import Free, Term, all_free_of, changed, slop
 from rtcomp.diagnosis.fitting.other_forms import overtones
 from rtcomp.diagnosis.fitting.stage_of import bank
 from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.forces.reaches import elements_of
 from rtcomp.diagnosis.forces.replicate import replicate
 from rtcomp.diagnosis.numerics.regression import Grams, Prior, System
 from rtcomp.diagnosis.positions.belief import LEVEL, Belief, is_sized
@@ -33,7 +34,6 @@ from rtcomp.diagnosis.settings import BELIEF_SD
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect
-from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.stage.stage import Stage
 
 STEP = 5e-3
@@ -126,11 +126,7 @@ class Trajectory(Fitter):
     def other_friction(self, model: Fitted) -> Floats:
         """See `Fitter`: each element of the believed friction stiffer by what a belief is off."""
         stage = self.stage(model)
-        friction = stage.friction
-        listed: list[tuple[float, ...]] = []
-        exponent = 0.0
-        if isinstance(friction, MaxwellSlip):
-            listed, exponent = friction.elements, friction.exponent
+        listed, exponent = elements_of(stage)
 
         def one(i: int) -> Floats:
             stiffer = (listed[i][0] * (1.0 + STEP), listed[i][1])
