@@ -14,8 +14,9 @@ from rtcomp.kernels import Floats
 RIDGE = 1e-9
 """Part of the columns' mean power that is added to each: columns alike share what they explain."""
 FREEDOM = 4.0
-"""Degrees of freedom of what is believed (Student's t): near the belief as Gauss has it, and a number that is
-far off, a guess of a hundredth, costs little more than one that is off by a few of its deviations."""
+"""Degrees of freedom of what is believed (Student's t) of a number that is larger: near the belief as Gauss
+has it, and a guess of a hundredth costs little more than one that is off by a few of its deviations. What is
+smaller is off by all of it at most, and as Gauss has it."""
 RELAXED, SETTLED = 20, 1e-3
 """Solutions with precisions of the one before, at most; relative change at which they are settled."""
 
@@ -40,12 +41,17 @@ class Prior:
 
     def relaxed(self, c: Floats) -> Prior:
         """Return the prior of Gauss that pulls coefficients `c` as Student's t does (Lange et al. 1989)."""
-        off = self.precision * (c - self.mean) ** 2
+        off = np.where(self._larger(c), self.precision * (c - self.mean) ** 2, 0.0)
         return Prior(self.mean, self.precision * FREEDOM / (FREEDOM + off), self.low, self.high)
 
     def charge(self, c: Floats) -> float:
         """Return what coefficients cost by what is believed, as squared errors over their variance."""
-        return float(np.sum(FREEDOM * np.log1p(self.precision * (c - self.mean) ** 2 / FREEDOM)))
+        off = self.precision * (c - self.mean) ** 2
+        return float(np.sum(np.where(self._larger(c), FREEDOM * np.log1p(off / FREEDOM), off)))
+
+    def _larger(self, c: Floats) -> np.ndarray:
+        """Tell which coefficients are further from nothing than believed, (p,) bool."""
+        return np.asarray((c - self.mean) * np.where(self.mean < 0.0, -1.0, 1.0) > 0.0)
 
     def extended(self, count: int) -> Prior:
         """Return the prior with so many further coefficients, of which nothing is known."""

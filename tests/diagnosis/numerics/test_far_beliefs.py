@@ -43,6 +43,15 @@ def test_a_guess_that_is_far_off_has_no_weight(seed: int, true: float) -> None:
     assert grams.relaxed(use, prior, 1.0)[1][0] == pytest.approx(plain, abs=0.01)
 
 
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 1000), true=st.floats(0.0, 1.0))
+def test_what_is_smaller_is_held_as_gauss_has_it(seed: int, true: float) -> None:
+    grams, prior, plain = problem(seed, true)
+    use = np.ones(1, dtype=np.bool_)
+    if plain < 1.0:
+        assert grams.relaxed(use, prior, 1.0)[1][0] == pytest.approx(grams.solve(use, prior, 1.0)[0], abs=1e-9)
+
+
 @given(c=st.floats(-60.0, 60.0))
 def test_the_pull_is_the_slope_of_what_it_costs(c: float) -> None:
     _, prior, _ = problem(1, 1.0)
