@@ -11,6 +11,7 @@ import numpy as np
 from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.fitting.believed import prior_of
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
@@ -19,6 +20,7 @@ from rtcomp.diagnosis.fitting.replicated import replicated
 from rtcomp.diagnosis.fitting.timing import put_in_step
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.forces.signals import FURTHEST
+from rtcomp.diagnosis.numerics.regression import LEADING
 from rtcomp.diagnosis.settings import LEAST_GAIN
 from rtcomp.kernels import Floats
 
@@ -53,7 +55,20 @@ def baseline(balance: ForceBalance) -> Fitted:
     _put_grid(fitter, ())
     balance.whiten(fitter.fit([]).coefficients)
     settle(fitter)
+    _let_go(fitter)
     return fitter.fit([])
+
+
+def _let_go(fitter: Fitter) -> None:
+    """Hold numbers of the belief, beside any effect, as the belief alone does: those far off by little.
+
+    Beside an effect they would be let go of to suit that: a damping against a friction that falls with speed.
+    """
+    model, balance = fitter.fit([]), fitter.balance
+    terms = [Term.of(e) for e in balance.believed]
+    plain = prior_of(balance, terms, model.system, offset=fitter.offset).precision
+    held = np.where(plain > 0.0, model.prior.precision / np.where(plain > 0.0, plain, 1.0), 1.0)
+    balance.let_go = np.append(held[:LEADING], held[balance.size :])
 
 
 def _damp(fitter: Fitter, terms: Sequence[Term], ends: float) -> None:

@@ -190,9 +190,8 @@ class Fitter:
         def of(c: Floats) -> Floats:
             elements = list(zip(c[b.friction], b.reaches, strict=True))
             own = sign * ent.all_amounts(self.believed_as(model, c) if effects else [])
-            return np.array(
-                [*c[: len(BASE)], *level_and_reach(elements, c[b.model] * b.models, b.exponent), *own]
-            )
+            held = level_and_reach(elements, c[b.model] * b.models, b.exponent)
+            return np.array([*c[: len(BASE)], *held, *own])
 
         return of(model.coefficients), np.array([of(c) for c in model.without]), sizes
 
@@ -218,7 +217,7 @@ class Fitter:
     ) -> tuple[System, Prior, Grams, Floats, float]:
         """Return the system of `terms`, its prior, statistics, coefficients and squared error in sample."""
         system, prior, grams = self._made(terms, weights, around)
-        prior, c = grams.relaxed(self.use, prior, variance)
+        prior, c = (grams.solved if terms else grams.relaxed)(self.use, prior, variance)
         return system, prior, grams, c, float(grams.errors(c, self.use).sum())
 
     def _made(
@@ -227,6 +226,7 @@ class Fitter:
         b = self.balance
         system = system_around(b, [t.entry for t in terms], weights, around)
         prior = prior_of(b, [*self._believed, *terms], system, offset=self.offset)
+        prior = prior.weighed(b.let_go, b.size) if terms else prior
         return system, prior, Grams.of(system.columns, system.y, b.block, b.blocks)
 
     def quick(self, terms: Sequence[Term]) -> float:

@@ -96,7 +96,7 @@ class ForceBalance(Signals):
             other.blocks, other.block = int(block[-1]) + 1, block
             other._reserved = np.zeros(other.blocks, dtype=np.bool_)
         other.believed_speed, other.speed_room = self.believed_speed, self.speed_room
-        other.level, other.exponent = self.level, self.exponent
+        other.level, other.exponent, other.let_go = self.level, self.exponent, self.let_go
         other._cache = Cache(KEPT_ONCE)
         if self._whitening is not None:
             other._weigh()

@@ -61,6 +61,7 @@ class Signals:
         self._fixed = exact((ent.build(e) for e in believed if not ent.adds_force(ent.kind_of(e))), data.held)
         self._elements, self.exponent = elements_of(stage)
         self.models = levels(stage)
+        self.let_go = np.zeros(0)  # factors of the precisions of believed numbers, see fitting/baseline
         self._cache = Cache()
         m = stage.mechanics
         self.believed_speed = m.micro_damping_speed if m.micro_damping > 0.0 else None

@@ -17,6 +17,8 @@ FREEDOM = 4.0
 """Degrees of freedom of what is believed (Student's t) of a number that is larger: near the belief as Gauss
 has it, and a guess of a hundredth costs little more than one that is off by a few of its deviations. What is
 smaller is off by all of it at most, and as Gauss has it."""
+LEADING = 3
+"""Coefficients that come first and are believed: mass and damping."""
 RELAXED, SETTLED = 20, 1e-3
 """Solutions with precisions of the one before, at most; relative change at which they are settled."""
 
@@ -41,17 +43,16 @@ class Prior:
 
     def relaxed(self, c: Floats) -> Prior:
         """Return the prior of Gauss that pulls coefficients `c` as Student's t does (Lange et al. 1989)."""
-        off = np.where(self._larger(c), self.precision * (c - self.mean) ** 2, 0.0)
+        larger = (c - self.mean) * np.where(self.mean < 0.0, -1.0, 1.0) > 0.0
+        off = np.where(larger, self.precision * (c - self.mean) ** 2, 0.0)
         return Prior(self.mean, self.precision * FREEDOM / (FREEDOM + off), self.low, self.high)
 
-    def charge(self, c: Floats) -> float:
-        """Return what coefficients cost by what is believed, as squared errors over their variance."""
-        off = self.precision * (c - self.mean) ** 2
-        return float(np.sum(np.where(self._larger(c), FREEDOM * np.log1p(off / FREEDOM), off)))
-
-    def _larger(self, c: Floats) -> np.ndarray:
-        """Tell which coefficients are further from nothing than believed, (p,) bool."""
-        return np.asarray((c - self.mean) * np.where(self.mean < 0.0, -1.0, 1.0) > 0.0)
+    def weighed(self, held: Floats, size: int) -> Prior:
+        """Return the prior with precisions times `held`: of the first ones, and of those from `size` on."""
+        precision, rest = self.precision.copy(), max(held.size - LEADING, 0)
+        precision[:LEADING] *= held[:LEADING] if held.size else 1.0
+        precision[size : size + rest] *= held[LEADING:]
+        return Prior(self.mean, precision, self.low, self.high)
 
     def extended(self, count: int) -> Prior:
         """Return the prior with so many further coefficients, of which nothing is known."""
@@ -99,6 +100,10 @@ class Grams:
         a += RIDGE * np.eye(scale.size)
         b = (cross + weight * prior.mean) / scale
         return np.asarray(bounded_minimum(a, b, prior.low * scale, prior.high * scale)) / scale
+
+    def solved(self, use: np.ndarray, prior: Prior, variance: float) -> tuple[Prior, Floats]:
+        """Return coefficients as `solve`, and the prior they have: as it is."""
+        return prior, self.solve(use, prior, variance)
 
     def relaxed(self, use: np.ndarray, prior: Prior, variance: float) -> tuple[Prior, Floats]:
         """Return coefficients as `solve`, where what is believed may be far off, and the prior they have."""

@@ -255,7 +255,7 @@ class Trajectory(Fitter):
         count = int(self.rows.sum())
 
         def left(c: Floats, rest: Floats, variance: float) -> float:
-            return float(np.sum(rest[self.rows] ** 2) + variance * prior.charge(c))
+            return float(np.sum(rest[self.rows] ** 2) + variance * np.sum(prior.precision * c**2))
 
         variance = float(np.sum(rest[self.rows] ** 2)) / count
         damping = 1e-2
@@ -270,7 +270,7 @@ class Trajectory(Fitter):
             before, better = left(c, rest, variance), False
             for _ in range(TRIES):
                 held = damping * power
-                precision = np.concatenate([prior.relaxed(c).precision, np.zeros(len(free))]) + held
+                precision = np.concatenate([prior.precision, np.zeros(len(free))]) + held
                 mean = held * np.concatenate([c, np.zeros(len(free))]) / np.maximum(precision, 1e-300)
                 wide = np.full(len(free), np.inf)
                 bounds = np.concatenate([prior.low, -wide]), np.concatenate([prior.high, wide])
@@ -333,7 +333,7 @@ class Trajectory(Fitter):
         y = rest + c @ own
         nowhere = slice(c.size, c.size)
         system = System(y, own, (nowhere,) * (len(self.balance.believed) + len(terms)))
-        prior = self.belief.prior.relaxed(c)
+        prior = self.belief.prior
         joint, wide = self.jointly(system, prior, tangents)
         sse = float(np.sum(rest[self.rows] ** 2))
         variance = sse / max(int(self.rows.sum()), 1)
