@@ -19,8 +19,7 @@ from rtcomp.diagnosis.fitting.law import law_of
 from rtcomp.diagnosis.fitting.replicated import replicated
 from rtcomp.diagnosis.fitting.timing import put_in_step
 from rtcomp.diagnosis.forces.balance import ForceBalance
-from rtcomp.diagnosis.forces.signals import FURTHEST
-from rtcomp.diagnosis.numerics.regression import LEADING
+from rtcomp.diagnosis.forces.signals import BASE, FURTHEST
 from rtcomp.diagnosis.settings import LEAST_GAIN
 from rtcomp.kernels import Floats
 
@@ -68,7 +67,7 @@ def _let_go(fitter: Fitter) -> None:
     terms = [Term.of(e) for e in balance.believed]
     plain = prior_of(balance, terms, model.system, offset=fitter.offset).precision
     held = np.where(plain > 0.0, model.prior.precision / np.where(plain > 0.0, plain, 1.0), 1.0)
-    balance.let_go = np.append(held[:LEADING], held[balance.size :])
+    balance.let_go = np.append(held[: len(BASE)], held[balance.size :])
 
 
 def _damp(fitter: Fitter, terms: Sequence[Term], ends: float) -> None:

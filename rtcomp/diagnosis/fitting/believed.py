@@ -17,6 +17,17 @@ FURTHEST = 5.0
 """Prior standard deviations from its believed size within which an effect may always be."""
 
 
+def as_held(balance: ForceBalance, prior: Prior) -> Prior:
+    """Return a prior with the precisions of believed numbers as the belief alone holds them (`baseline`)."""
+    held, first = balance.let_go, len(BASE)
+    if not held.size:
+        return prior
+    precision, sizes = prior.precision.copy(), slice(balance.size, balance.size + held.size - first)
+    precision[:first] *= held[:first]
+    precision[sizes] *= held[first:]
+    return Prior(prior.mean, precision, prior.low, prior.high)
+
+
 def prior_of(balance: ForceBalance, terms: Sequence[Term], system: System, *, offset: bool) -> Prior:
     """Return what is believed: mass, damping and sizes near the belief, no negative stiffness.
 

@@ -26,7 +26,7 @@ from rtcomp.diagnosis.fitting.at_hand import (
     system_around,
     tangents_of,
 )
-from rtcomp.diagnosis.fitting.believed import prior_of
+from rtcomp.diagnosis.fitting.believed import as_held, prior_of
 from rtcomp.diagnosis.fitting.fitted import Fitted, left_out
 from rtcomp.diagnosis.fitting.free import Free, Term, changed, free_of
 from rtcomp.diagnosis.fitting.other_forms import other_beliefs, other_forms, variants
@@ -226,7 +226,7 @@ class Fitter:
         b = self.balance
         system = system_around(b, [t.entry for t in terms], weights, around)
         prior = prior_of(b, [*self._believed, *terms], system, offset=self.offset)
-        prior = prior.weighed(b.let_go, b.size) if terms else prior
+        prior = as_held(b, prior) if terms else prior
         return system, prior, Grams.of(system.columns, system.y, b.block, b.blocks)
 
     def quick(self, terms: Sequence[Term]) -> float:

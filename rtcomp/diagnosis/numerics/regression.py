@@ -17,8 +17,6 @@ FREEDOM = 4.0
 """Degrees of freedom of what is believed (Student's t) of a number that is larger: near the belief as Gauss
 has it, and a guess of a hundredth costs little more than one that is off by a few of its deviations. What is
 smaller is off by all of it at most, and as Gauss has it."""
-LEADING = 3
-"""Coefficients that come first and are believed: mass and damping."""
 RELAXED, SETTLED = 20, 1e-3
 """Solutions with precisions of the one before, at most; relative change at which they are settled."""
 
@@ -46,13 +44,6 @@ class Prior:
         larger = (c - self.mean) * np.where(self.mean < 0.0, -1.0, 1.0) > 0.0
         off = np.where(larger, self.precision * (c - self.mean) ** 2, 0.0)
         return Prior(self.mean, self.precision * FREEDOM / (FREEDOM + off), self.low, self.high)
-
-    def weighed(self, held: Floats, size: int) -> Prior:
-        """Return the prior with precisions times `held`: of the first ones, and of those from `size` on."""
-        precision, rest = self.precision.copy(), max(held.size - LEADING, 0)
-        precision[:LEADING] *= held[:LEADING] if held.size else 1.0
-        precision[size : size + rest] *= held[LEADING:]
-        return Prior(self.mean, precision, self.low, self.high)
 
     def extended(self, count: int) -> Prior:
         """Return the prior with so many further coefficients, of which nothing is known."""

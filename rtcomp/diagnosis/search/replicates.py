@@ -26,8 +26,6 @@ from rtcomp.kernels import Floats
 
 FEW, MORE = 6, 4
 """Replicates after which what is plain is settled; so many more at a time where it is not."""
-ANEW = 4
-"""Candidates made anew at a time on a replicate."""
 IN_FULL = 3
 """One of so many replicates drawn at a time is fitted with its best candidate: those with the largest."""
 
@@ -114,18 +112,20 @@ def _largest(
 ) -> tuple[Candidate, Screened] | tuple[None, None]:
     """Return the candidate that gains most beside a model of a replicate, by the columns it has there.
 
-    Columns of the recording see the same motion with other noise. What a replicate's own columns lack by
-    their noise, they would add: an instrument that the recording itself does not have. So those that seem to
-    gain most are made anew, until none that is left seems to gain more than the best of these.
+    Columns of the recording see the same motion with other noise, which tells more of a replicate than its
+    own columns do. So the candidates that seem to gain most are computed on the replicate, one by one, until
+    no other seems to gain more than the best of these.
     """
     order = sorted((each for each in gains if each[1].gain > 0.0), key=lambda each: -each[1].gain)
     best: tuple[Candidate, Screened] | tuple[None, None] = (None, None)
-    while order and (best[1] is None or order[0][1].gain > best[1].gain):
-        some, order = order[:ANEW], order[ANEW:]
-        made = [c for c in (on_other(candidate, fitter, model) for candidate, _ in some) if c is not None]
-        for pair in zip(made, Screen(made, fitter, variants).beside(model), strict=True):
-            if pair[1].gain > (0.0 if best[1] is None else best[1].gain):
-                best = pair
+    for candidate, seeming in order:
+        if best[1] is not None and best[1].gain >= seeming.gain:
+            break
+        own = on_other(candidate, fitter, model)
+        if own is not None:
+            (screened,) = Screen([own], fitter, variants).beside(model)
+            if screened.gain > (0.0 if best[1] is None else best[1].gain):
+                best = own, screened
     return best
 
 
