@@ -104,6 +104,8 @@ def ready(folder: Path, example: str) -> list[str]:
     if words[0] == "hil":  # every link and fault in full in test_hil.py
         words = [word if word != "all" else "kill" for word in words]
         words += ["--seconds", "3", "--at-least", "5", *([] if "--fault" in words else ["--fault", "kill"])]
+    if words[0] == "demo" and "--serial" in words:  # in real time, four runs one after the other
+        words += ["--seconds", "12"]
     for word in words:
         if word.endswith("model.yaml"):
             (folder / word).write_bytes((folder / "model.yaml").read_bytes())

@@ -186,7 +186,8 @@ def numbers(fitter: Fitter, believed: Stage, fitted: Fitted, *, effects: bool = 
     half = np.sqrt(factor**2 * spread + (MODEL * values) ** 2 + off**2)
     m = believed.mechanics
     before = np.array([m.mass, m.viscous, m.micro_damping, *believed_friction(believed), *np.abs(sizes)])
-    own = [(ent.kind_of(e), n) for e in fitter.balance.believed if effects for n in ent.amounts_of(e)]
+    sized = fitter.believed_as(fitted, fitted.coefficients) if effects else []
+    own = [(ent.kind_of(e), n) for e in sized for n in ent.amounts_of(e)]
     units = Numbers.units + tuple(ent.parameter(kind, name).unit for kind, name in own)
     return Numbers(before, values, half, units)
 

@@ -36,8 +36,7 @@ is none."""
 SMOOTH = 0.05
 """Part (rms) of a force that they may leave of it."""
 LONGER = 0.02
-"""Step of the derivative by the period, in waves over the stroke: a period that was fitted without overtones
-is biased."""
+"""Step of the derivative by the period, in waves over the stroke."""
 
 
 def other_forms(fitter: Fitter, model: Fitted, at: int) -> Floats:
@@ -165,7 +164,9 @@ def _bent_along(fitter: Fitter, model: Fitted, at: int, signal: Floats) -> Float
 def overtones(fitter: Fitter, model: Fitted, entry: Entry) -> Floats:
     """Return the columns (q, n) of what makes a wave of one form one of another.
 
-    None of what is no wave, or does not repeat within the stroke: that is any function of the position.
+    A period that was fitted without overtones is biased: the last column is what all of them do where they
+    are longer, by one factor. Each by its own, they are no wave but any function of the position. None of
+    what is no wave, or does not repeat within the stroke: that is such a function too.
     """
     kind = ent.kind_of(entry)
     phase = next((p.name for p in kind.parameters if p.unit == ent.PHASE), None)
@@ -174,16 +175,19 @@ def overtones(fitter: Fitter, model: Fitted, entry: Entry) -> Floats:
     if phase is None or not wave or 2.0 * float(entry[ent.PERIOD]) > high - low:
         return np.zeros((0, model.residual.size))
     still = {n: ent.neutral(kind, n) for n in kind.linear if n in entry and n != ent.AMPLITUDE}
-    found = []
-    repeated = [repeats for repeats in OTHERS if 2.0 * repeats * float(entry[ent.PERIOD]) <= high - low]
+    waves, slopes = np.zeros((0, model.residual.size)), np.zeros((0, model.residual.size))
+    period = float(entry[ent.PERIOD])
+    repeated = [repeats for repeats in OTHERS if 2.0 * repeats * period <= high - low]
     for over in (one for repeats in repeated for one in OTHERS[repeats]):
-        period, made = float(entry[ent.PERIOD]) * over, []
+        made = []
         for longer in (0.0, LONGER * period / (high - low)):
-            other = {**entry, **still, ent.PERIOD: period * (1.0 + longer)}
+            other = {**entry, **still, ent.PERIOD: period * over * (1.0 + longer)}
             other.pop("form", None)
             made.append(_quarters(fitter, model, kind, other, phase))
-        found += [made[0], (made[1] - made[0]) / LONGER]
-    return np.concatenate(found)
+        waves = np.concatenate([waves, made[0]])
+        slopes = np.concatenate([slopes, (made[1] - made[0]) / LONGER])
+    sizes = _beside(fitter, model, waves)[-1][-waves.shape[0] :]
+    return np.concatenate([waves, (sizes @ slopes)[None]])
 
 
 def _quarters(fitter: Fitter, model: Fitted, kind: type[Effect], wave: Entry, phase: str) -> Floats:

@@ -103,8 +103,12 @@ def level_and_reach(
 
 def law(believed: Stage, found: Stage) -> list[Retuned]:
     """Return the law by which friction yields, where that found is another than the believed one."""
-    before, after = (elements_of(stage)[1] for stage in (believed, found))
-    return [] if before == after else [Retuned(EXPONENT, before, Value(after, after, after, "1"))]
+    (elements, before), (_, after) = (elements_of(stage) for stage in (believed, found))
+    return (
+        []
+        if before == after or not elements
+        else [Retuned(EXPONENT, before, Value(after, after, after, "1"))]
+    )
 
 
 def believed_friction(stage: Stage) -> tuple[float, float]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.entries import Entry
+from rtcomp.diagnosis.fitting.at_hand import by_weights
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.forces.balance import BASE, ForceBalance
 from rtcomp.errors import ConfigError
@@ -27,7 +28,8 @@ UNITS = {
 }
 """Numbers of the stage file's section ``stage`` that have a force or a length in their unit."""
 SLIGHT = 1e-6
-"""Part of the largest yield force below which a friction unit is left out."""
+"""Part of the largest yield force below which a friction unit is left out; of the drive's force too, where no
+effect makes many times as much of it."""
 
 
 def stage_of(balance: ForceBalance, fitted: Fitted, *, between: bool = False) -> Stage:
@@ -47,7 +49,8 @@ def stage_of(balance: ForceBalance, fitted: Fitted, *, between: bool = False) ->
         stiffness, reaches = _between(balance, stiffness)
     level = stiffness * reaches
     force = float(np.sqrt(np.mean(np.concatenate([s.voltage for s in balance.data.segments]) ** 2)))
-    least = SLIGHT * max(float(level.max()), force * balance.stage.force_constant)
+    none = 0.0 if by_weights(balance, fitted.entries) else force * balance.stage.force_constant
+    least = SLIGHT * max(float(level.max()), none)
     units = [(float(k), float(r)) for k, r, f in zip(stiffness, reaches, level, strict=True) if f > least]
     kept = [float(factor) for factor in c[balance.model] if factor > SLIGHT]
     model = [friction_in("N", data["stage"]["friction"], factor) for factor in kept]

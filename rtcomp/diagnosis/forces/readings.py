@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,8 +31,6 @@ BEYOND = 20.0
 """Times the stage's voltage limit, from which on a command is in another unit."""
 NEAR = 3.0
 """Factor that a mass may be off beside its unit."""
-BETTER = 2.0
-"""Times the squared error that the believed mass must leave against a free one, to be told from it."""
 MASS = "the stage's mass"
 EXCERPT = 40_000
 """Rows that are looked at."""
@@ -93,13 +92,15 @@ def _one_axis(stage: Stage, recordings: Sequence[Recording]) -> None:
     """Raise RecordingError where the motions ask for masses too different to be of one axis."""
     if len(recordings) < 2:
         return
-    masses = [moving_mass(stage, r) or stage.mass for r in recordings]
-    small, large = int(np.argmin(masses)), int(np.argmax(masses))
-    if masses[large] > NEAR * masses[small]:
+    masses = [mass_asked_for(stage, r) for r in recordings]
+    small = int(np.argmin([m.value + m.slack for m in masses]))
+    large = int(np.argmax([m.value - m.slack for m in masses]))
+    if masses[large].value - masses[large].slack > NEAR * (masses[small].value + masses[small].slack):
         one, other = recordings[small], recordings[large]
         raise RecordingError(
-            f"recordings of different axes: the motion of {one.path} asks for a mass of {masses[small]:.3g}, "
-            f"that of {other.path} for {masses[large]:.3g} ({_mass_unit(stage)}); diagnose each by itself"
+            f"recordings of different axes: the motion of {one.path} asks for a mass of "
+            f"{masses[small].value:.3g}, that of {other.path} for {masses[large].value:.3g} "
+            f"({_mass_unit(stage)}); diagnose each by itself"
         )
 
 
@@ -122,13 +123,15 @@ def _misread(stage: Stage, recording: Recording) -> tuple[str, list[Reading]] | 
         made = [Reading("voltage", f, unit) for f, unit in names.items()]
         likely = [r for r in made if largest * r.factor <= 2.0 * stage.voltage_limit]
         return why, likely or made
-    mass = moving_mass(stage, recording)
-    if mass is None:
+    mass = mass_asked_for(stage, recording)
+    if mass.value <= 0.0 or abs(mass.value - stage.mass) <= mass.slack:
         return None
-    likely = [r for r, times in _by_mass(stage) if 1.0 / NEAR < mass / (times * stage.mass) < NEAR]
+    likely = [r for r, times in _by_mass(stage) if 1.0 / NEAR < mass.value / (times * stage.mass) < NEAR]
     if not likely:
         return None
-    why = f"the motion asks for a mass of {mass:.3g} {_mass_unit(stage)}, the stage has {stage.mass:.3g}"
+    why = (
+        f"the motion asks for a mass of {mass.value:.3g} {_mass_unit(stage)}, the stage has {stage.mass:.3g}"
+    )
     return why, likely
 
 
@@ -145,8 +148,15 @@ def _by_mass(stage: Stage) -> list[tuple[Reading, float]]:
     return [*found, (Reading("time", 1e-3, "ms"), 1e6)]
 
 
-def moving_mass(stage: Stage, recording: Recording) -> float | None:
-    """Return the mass (kg) that a motion asks for beside all other forces; None where it fits the stage's.
+class Mass(NamedTuple):
+    """A mass (kg or kg m^2), and by how much it would be off if what is left moved with the acceleration."""
+
+    value: float
+    slack: float
+
+
+def mass_asked_for(stage: Stage, recording: Recording) -> Mass:
+    """Return the mass that a motion asks for beside all other forces; any is possible where nothing moves.
 
     Regression of the drive's force on acceleration, damping, friction of six yield displacements, a spring
     and a constant, below the frequency where noise is as strong as the motion.
@@ -178,11 +188,9 @@ def moving_mass(stage: Stage, recording: Recording) -> float | None:
     a_left, y_left = _without(basis, a), _without(basis, y)
     power = float(a_left @ a_left)
     if not power > 0.0:
-        return None
+        return Mass(stage.mass, math.inf)
     mass = float(a_left @ y_left) / power
-    free = float(np.sum((y_left - mass * a_left) ** 2))
-    held_to = float(np.sum((y_left - stage.mass * a_left) ** 2))
-    return mass if mass > 0.0 and held_to > BETTER * free else None
+    return Mass(mass, float(np.linalg.norm(y_left - mass * a_left)) / math.sqrt(power))
 
 
 def _without(basis: Floats, column: Floats) -> Floats:

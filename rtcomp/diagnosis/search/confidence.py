@@ -67,17 +67,19 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         models = [chosen, *_others(fitter, found, i, rest, ends)]
         errors = [_by_cell(fitter, m) for m in models]
         errors, rows = above_noise(found, errors, _independent(fitter, chosen) / errors[0].size)
-        weight = probabilities(errors, rows, [m.size for m in models])
-        alike = set(confidence_set(errors, SET_LEVEL))
         least = (1.0 - ALIAS) * log_gain(rest.errors, chosen.errors)
-        members = alike | {0} | {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
+        members = {0, *confidence_set(errors, SET_LEVEL)}
+        members |= {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
         members |= _not_separate(fitter, found, models, set(range(len(models))) - members, ends)
-        members -= {k for k in members if k and explains_another(fitter, chosen, rest, models[k], ends)}
-        if 0 in alike:
+        besides = {k for k in members if k and explains_another(fitter, chosen, rest, models[k], ends)}
+        rivals, members = [k for k in range(len(models)) if k not in besides], members - besides
+        of_rivals, weight = [errors[k] for k in rivals], np.zeros(len(models))
+        weight[rivals] = probabilities(of_rivals, rows, [models[k].size for k in rivals])
+        if 0 in {rivals[j] for j in confidence_set(of_rivals, SET_LEVEL)}:
             plainer = min(members, key=lambda k: (models[k].size, -weight[k]))
             instead = plainer if models[plainer].size < chosen.size and weight[plainer] > weight[0] else 0
         else:
-            as_plain = [k for k, m in enumerate(models) if m.size <= chosen.size]
+            as_plain = [k for k in rivals if models[k].size <= chosen.size]
             instead = min(as_plain, key=lambda k: float(np.log(errors[k]).sum()))
         if instead:
             found.alternatives = [m for m in found.alternatives if m is not models[instead]] + [chosen]

@@ -13,7 +13,7 @@ from rtcomp.diagnosis.candidates.screening import Screen, Screened, look
 from rtcomp.diagnosis.fitting.baseline import baseline
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.free import Term
-from rtcomp.diagnosis.fitting.other_forms import errors_beside, force_of, overtones
+from rtcomp.diagnosis.fitting.other_forms import errors_beside, force_of, in_any_form, overtones
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.forces.factor import larger_by
 from rtcomp.diagnosis.mismatch.where import as_white
@@ -228,11 +228,33 @@ def test_what_goes_by_speed_beside_a_law_of_speed_that_no_number_bends_is_a_furt
 
 @pytest.mark.parametrize(("times", "harmonics"), [(1.8, 0), (2.6, 2), (4.4, 4)])
 def test_harmonics_are_of_a_wave_that_repeats_within_the_stroke(times: float, harmonics: int) -> None:
-    """Those of twice the period too, where that comes twice; four columns each, two of them by the period."""
+    """Those of twice the period too, where that comes twice; two columns each, and one by the period of all."""
     axis = stage()
     balance = ForceBalance(axis, load_data([run(axis, there_and_back(12.0))]))
     base, fitter = baseline(balance), Fitter(balance)
     low, high = balance.data.stroke
     wave = {"name": "cogging", "amplitude": 0.5, "period": (high - low) / times, "phase": 0.3}
     model = fitter.fit([Term(wave, frozenset())], base)
-    assert overtones(fitter, model, wave).shape[0] == 4 * harmonics
+    assert overtones(fitter, model, wave).shape[0] == (2 * harmonics + 1 if harmonics else 0)
+
+
+def test_a_bump_of_force_is_no_wave_of_another_form() -> None:
+    """Harmonics of a wave make up for one of another form and period, and not for what comes once."""
+    believed = stage()
+    recording = run(believed, there_and_back(12.0))
+    x = recording.position
+    span = float(np.ptp(x))
+    at = 2.0 * np.pi * (x - x.mean()) / (0.22 * span)
+    bump = np.exp(-(((x - x.mean() + 0.15 * span) / (0.04 * span)) ** 2))
+    left = []
+    for force in (np.tanh(2.0 * np.sin(at)) + 0.4 * np.cos(2.0 * at), 3.0 * bump):
+        pushed = {**recording.columns, "voltage": recording.voltage + force / believed.force_constant}
+        balance = ForceBalance(believed, load_data([replace(recording, columns=pushed)]))
+        base, fitter = baseline(balance), Fitter(balance)
+        wave = {"name": "cogging", "amplitude": 1.0, "period": 0.221 * span, "phase": 0.0}
+        model = fitter.fit([Term.of(wave)], base)
+        rest = in_any_form(fitter, model, overtones(fitter, model, model.entries[0]))
+        left.append(float(np.std(rest.residual[fitter.rows]) / np.std(base.residual[fitter.rows])))
+    wave_left, bump_left = left
+    assert wave_left < 0.1
+    assert bump_left > 0.65

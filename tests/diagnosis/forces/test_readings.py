@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recorded import RATE, changed, run, stage, there_and_back
 
-from rtcomp.diagnosis.forces.readings import in_si_units
+from rtcomp.diagnosis.forces.readings import in_si_units, mass_asked_for
 from rtcomp.diagnosis.recordings.admit import admit
 from rtcomp.errors import ConfigError, RecordingError
 from rtcomp.recording.reader import Recording
@@ -84,6 +84,16 @@ def test_recordings_of_different_axes_are_refused(good: Recording) -> None:
         in_si_units(thin(), [good, heavy], assume=False)
     again = replace(run(stage(mass=2.5), SEVERAL, seed=2), path=Path("again.csv"))
     assert in_si_units(thin(), [good, again], assume=False)[1] == []
+
+
+def test_a_mass_that_a_motion_hardly_tells_is_of_any_axis(good: Recording) -> None:
+    """A slow motion with a force that nobody believes: what it asks for is far off, and not sure."""
+    slow = run(stage(), there_and_back())
+    force = 0.5 * np.sin(slow.position / 2e-5) + 0.3 * np.sin(2 * np.pi * 0.7 * slow.time) ** 3
+    pushed = changed(slow, voltage=slow.voltage + force)
+    mass = mass_asked_for(thin(), pushed)
+    assert abs(mass.value - 2.0) < mass.slack
+    assert in_si_units(thin(), [good, replace(pushed, path=Path("slow.csv"))], assume=False)[1] == []
 
 
 def test_an_effect_that_no_axis_has_is_refused(good: Recording) -> None:

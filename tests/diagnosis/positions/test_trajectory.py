@@ -14,6 +14,7 @@ from recorded import at_hand
 
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.fitting.intervals import numbers
 from rtcomp.diagnosis.fitting.other_forms import in_any_form
 from rtcomp.diagnosis.forces.replicate import replicate
 from rtcomp.diagnosis.forces.sticking import courses, untold
@@ -101,6 +102,16 @@ def test_friction_that_is_little_beside_a_spring_hides_nothing() -> None:
     spring = {"name": "parallel-spring", "stiffness": 2.0}
     sprung = stage(spring, friction=[{"stiffness": 1.0, "reach": 1.0e-3}])
     assert untold(balanced(sprung, [recorded(sprung)])) < 0.1 * MUCH
+
+
+def test_a_constant_force_that_was_found_with_the_friction_has_its_own_unit(loaded: list[Recording]) -> None:
+    """A belief without friction is judged as forces have it: what they found beside it is believed then."""
+    believed = stage()
+    found = stage({"name": "constant-force", "force": 0.02})
+    fitter = Trajectory.of(balanced(believed, loaded), found)
+    told = numbers(fitter, found, fitter.fit([], steps=0), effects=True)
+    assert len(told.units) == told.values.size == told.before.size
+    assert told.units[-1] == "N"
 
 
 def test_a_way_run_at_a_steady_speed_is_no_work_of_forces(loaded: list[Recording]) -> None:
