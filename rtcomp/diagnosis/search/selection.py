@@ -130,7 +130,8 @@ def search(
         if clock.now() < ends:
             beam, grown = _resettled(fitter, found, beam, grown, parents, ends)
             everything = float(found.baseline.errors.sum())
-        if doubted is not None and doubted(beam[0]):
+            beam = [m for m in beam if _better(fitter, m, found.chosen, null, everything)]
+        if doubted is not None and beam and doubted(beam[0]):
             found.doubted = True
             break
     if found.elsewhere:
@@ -254,7 +255,8 @@ def _resettled(
     """Refit all on yield displacements that suit the best model: those of a poorer one were bent to it.
 
     Of the models that were `grown`, those that come near the best. Its own numbers were bent as well, so both
-    are settled in turn, as long as the error falls.
+    are settled in turn, as long as the error falls. An effect that only made up for what was not settled is
+    left out again.
     """
     best, left, found.elsewhere = beam[0], math.inf, True
     while best.sse < (1.0 - LEAST_GAIN) ** 2 * left and clock.now() < ends:
@@ -267,7 +269,10 @@ def _resettled(
     near = [g for g in sorted(grown, key=score) if all(g is not m for m in beam)]
     near = [g for g in near if score(g) < score(beam[0]) + NEAR][:BEAM]
     # On its own friction an effect may go to a bound that it kept away from on a poorer one.
-    return sorted(again, key=lambda m: (m.at_bound, score(m))), [*again, *_refitted(fitter, near)]
+    order = sorted(again, key=lambda m: (m.at_bound, score(m)))
+    first = pruned(fitter, order[0], (), found.null, float(found.baseline.errors.sum()), ends)
+    parents[id(first)] = parents[id(order[0])]
+    return [first, *order[1:]], [*again, *_refitted(fitter, near)]
 
 
 def _refitted(fitter: Fitter, models: Sequence[Fitted]) -> list[Fitted]:

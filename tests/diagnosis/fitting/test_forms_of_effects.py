@@ -228,7 +228,7 @@ def test_what_goes_by_speed_beside_a_law_of_speed_that_no_number_bends_is_a_furt
 
 @pytest.mark.parametrize(("times", "harmonics"), [(1.8, 0), (2.6, 2), (4.4, 4)])
 def test_harmonics_are_of_a_wave_that_repeats_within_the_stroke(times: float, harmonics: int) -> None:
-    """Those of twice the period too, where that comes twice; two columns each, and one by the period of all."""
+    """Those of twice the period too, where that comes twice; two columns each, and one by the period."""
     axis = stage()
     balance = ForceBalance(axis, load_data([run(axis, there_and_back(12.0))]))
     base, fitter = baseline(balance), Fitter(balance)
