@@ -165,6 +165,14 @@ def is_form(kind: type[Effect], p: Parameter) -> bool:
     return p.choice or (p.default is not None and p.name in kind.search_grid)
 
 
+def in_other_forms(entry: Mapping[str, Any]) -> list[Entry]:
+    """Return an entry in each other form that one of its parameters may have."""
+    kind = kind_of(entry)
+    forms = [p for p in kind.parameters if p.name in entry and is_form(kind, p)]
+    values = [(p.name, v) for p in forms for v in kind.search_grid.get(p.name) or (p.low, p.high)]
+    return [{**entry, name: value} for name, value in values if value != entry[name]]
+
+
 def _settled(kind: type[Effect], p: Parameter) -> bool:
     """Tell whether a parameter is settled by the search: a form is, and a moment, between two rows."""
     return p.held or p.name == MOMENT or is_form(kind, p)

@@ -61,13 +61,8 @@ def in_better_form(fitter: Fitter, found: Sequence[Fitted], ends: float) -> list
     better = []
     for larger in found:
         term = larger.terms[-1]
-        kind = ent.kind_of(term.entry)
-        for p in kind.parameters:
-            if p.name not in term.entry or not ent.is_form(kind, p):
-                continue
-            others = [v for v in (kind.search_grid.get(p.name) or (p.low, p.high)) if v != term.entry[p.name]]
-            made = [term.with_entry({**term.entry, p.name: value}) for value in others]
-            better += [one for one in made if better_than(larger, one)]
+        made = [term.with_entry(entry) for entry in ent.in_other_forms(term.entry)]
+        better += [one for one in made if better_than(larger, one)]
     return better
 
 

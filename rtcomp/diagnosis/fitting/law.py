@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
@@ -14,36 +16,63 @@ STOP, SOLID = 0.0, 1.0
 """Exponents of Dahl's law: of a stop, which yields at its reach at once, and of a solid that nears it."""
 RANGE, SETTLED = (0.25, 3.0), 0.02
 """Exponents of a solid, and how well the best of them is found."""
+ASIDE = (0.8, 1.25)
+"""Exponents that show whether another than SOLID leaves less."""
 
 
 def law_of(fitter: Fitter, terms: Sequence[Term]) -> float:
     """Return the exponent by which `terms` leave least: that at hand, or one that leaves less.
 
-    Less by what an effect must gain to matter. A believed model of friction has its own law.
+    Less by what an effect must gain to matter. A believed model of friction has its own law. Numbers of
+    `terms` move with it, and the last may be of another form: what suits one law may hide another.
     """
     balance = fitter.balance
-    at_hand = fitter.fit(terms, steps=0)
+    at_hand = fitter.fit(terms)
     if balance.models.size or not at_hand.coefficients[balance.friction].any():
         return balance.exponent
+    was = STOP if balance.exponent == STOP else SOLID
+    first = (fitter, at_hand) if balance.exponent == was else _by(fitter, was, terms)
+    other = STOP if was == SOLID else SOLID
+    second = _by(fitter, other, terms)
+    law, best = (other, second) if _less(first, second) else (was, first)
+    return law if law == STOP else _settled(*best)
 
-    def by(exponent: float) -> tuple[Fitter, Fitted]:
-        other = fitter.on(balance.data)
-        other.balance.exponent = exponent
-        return other, other.fit(terms, steps=0)
 
-    def less(other: Fitter, model: Fitted) -> bool:
-        gained = fitter.relative(at_hand, seen=True) ** 2 - other.relative(model, seen=True) ** 2
-        return log_gain(at_hand.errors, model.errors) > 2.0 * LEAST_GAIN and gained > NEGLIGIBLE**2
+def _by(fitter: Fitter, exponent: float, terms: Sequence[Term]) -> tuple[Fitter, Fitted]:
+    """Return `terms` fitted beside friction of an exponent, the last in the form that leaves least."""
+    other = _of(fitter, exponent)
+    forms = [term.with_entry(entry) for term in terms[-1:] for entry in ent.in_other_forms(term.entry)]
+    ways = [terms, *([*terms[:-1], form] for form in forms)]
+    return other, min(shared(other.fit, ways), key=lambda model: model.sse)
 
-    if balance.exponent != STOP and less(*by(STOP)):
-        return STOP
-    if balance.exponent == STOP and not less(*by(SOLID)):
-        return STOP
+
+def _of(fitter: Fitter, exponent: float) -> Fitter:
+    other = fitter.on(fitter.balance.data)
+    other.balance.exponent = exponent
+    return other
+
+
+def _less(one: tuple[Fitter, Fitted], other: tuple[Fitter, Fitted]) -> bool:
+    """Tell whether the other model leaves less by what matters, each beside friction of its own law."""
+    before, after = (fitter.relative(model, seen=True) ** 2 for fitter, model in (one, other))
+    gained = log_gain(one[1].errors, other[1].errors)
+    return gained > 2.0 * LEAST_GAIN and before - after > NEGLIGIBLE**2
+
+
+def _settled(solid: Fitter, model: Fitted) -> float:
+    """Return the exponent that leaves least at the numbers of a model by SOLID, that if no less matters."""
+
+    def at(exponent: float) -> tuple[Fitter, Fitted]:
+        other = _of(solid, exponent)
+        return other, other.fit(model.terms, steps=0)
+
+    def gain(exponent: float) -> float:
+        return log_gain(model.errors, at(exponent)[1].errors)
+
+    if max(shared(gain, ASIDE)) <= 0.0:
+        return SOLID
     from scipy.optimize import minimize_scalar
 
-    best = minimize_scalar(
-        lambda exponent: -log_gain(at_hand.errors, by(exponent)[1].errors),
-        bounds=RANGE, method="bounded", options={"xatol": SETTLED},
-    )  # fmt: skip
+    best = minimize_scalar(lambda e: -gain(e), bounds=RANGE, method="bounded", options={"xatol": SETTLED})
     exponent = float(best.x)
-    return exponent if less(*by(exponent)) else balance.exponent
+    return exponent if _less((solid, model), at(exponent)) else SOLID

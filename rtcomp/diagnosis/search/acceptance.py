@@ -124,8 +124,9 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
         if not why:
             without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
             rest = in_any_form(fitter, chosen, _only_forms(fitter, chosen, (i,)))
+            there = in_any_form(fitter, without, _forms_beside(fitter, chosen, (i,)))
             left = math.sqrt(
-                _of_the_force(fitter, rest, without, null) * _as_weighed(fitter, rest, without, null)
+                _of_the_force(fitter, rest, there, null) * _as_weighed(fitter, rest, there, null)
             )
             why = TOO_MUCH.format(100.0 * min(left, 1.0)) if more and left > LEFT else ""
             if not why and more:
@@ -165,8 +166,14 @@ def _only_forms(fitter: Fitter, chosen: Fitted, some: Sequence[int]) -> Floats:
     By another law of what it goes by each is the same effect; the others may be of another form, and the
     friction of another shape.
     """
-    each = [(fitter.variants if i in some else fitter.forms_of)(chosen, i) for i in range(len(chosen.terms))]
-    return np.concatenate([fitter.other_friction(chosen), *each])
+    own = [fitter.variants(chosen, i) for i in some]
+    return np.concatenate([_forms_beside(fitter, chosen, some), *own])
+
+
+def _forms_beside(fitter: Fitter, chosen: Fitted, some: Sequence[int]) -> Floats:
+    """Return the columns (q, n) of other forms of what stands beside `some` effects, friction among it."""
+    others = [fitter.forms_of(chosen, i) for i in range(len(chosen.terms)) if i not in some]
+    return np.concatenate([fitter.other_friction(chosen), *others])
 
 
 def _of_the_force(fitter: Fitter, rest: Fitted, without: Fitted, null: Null | None) -> float:

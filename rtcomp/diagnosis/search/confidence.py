@@ -67,29 +67,33 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         models = [chosen, *_others(fitter, found, i, rest, ends)]
         errors = [_by_cell(fitter, m) for m in models]
         errors, rows = above_noise(found, errors, _independent(fitter, chosen) / errors[0].size)
+        weight = probabilities(errors, rows, [m.size for m in models])
+        alike = set(confidence_set(errors, SET_LEVEL))
         least = (1.0 - ALIAS) * log_gain(rest.errors, chosen.errors)
-        members = {0, *confidence_set(errors, SET_LEVEL)}
-        members |= {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
+        members = alike | {0} | {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
         members |= _not_separate(fitter, found, models, set(range(len(models))) - members, ends)
         besides = {k for k in members if k and explains_another(fitter, chosen, rest, models[k], ends)}
-        rivals, members = [k for k in range(len(models)) if k not in besides], members - besides
-        of_rivals, weight = [errors[k] for k in rivals], np.zeros(len(models))
-        weight[rivals] = probabilities(of_rivals, rows, [models[k].size for k in rivals])
-        if 0 in {rivals[j] for j in confidence_set(of_rivals, SET_LEVEL)}:
+        members -= besides
+        if 0 in alike:
             plainer = min(members, key=lambda k: (models[k].size, -weight[k]))
             instead = plainer if models[plainer].size < chosen.size and weight[plainer] > weight[0] else 0
         else:
-            as_plain = [k for k in rivals if models[k].size <= chosen.size]
+            as_plain = [k for k, m in enumerate(models) if m.size <= chosen.size]
             instead = min(as_plain, key=lambda k: float(np.log(errors[k]).sum()))
         if instead:
             found.alternatives = [m for m in found.alternatives if m is not models[instead]] + [chosen]
             found.chosen, found.beside, done = models[instead], None, []
             continue
+        rivals = [k for k in range(len(models)) if k not in besides]
+        weight = np.zeros(len(models))
+        weight[rivals] = probabilities([errors[k] for k in rivals], rows, [models[k].size for k in rivals])
         plainest = min(models[k].size for k in members)
         enough = max(weight[k] for k in members if models[k].size == plainest)
         members = {k for k in members if models[k].size == plainest or weight[k] > enough} | {0}
-        if _may_be_no_wave(fitter, found, i):
-            members |= {k for k, m in enumerate(models) if k and _gain_by_position(fitter, rest, m) >= least}
+        # What needs more numbers than a spring, and no more than one by another law explains, may be one.
+        wave = _may_be_no_wave(fitter, found, i)
+        bent = {k for k, m in enumerate(models) if k and (wave or m.size < chosen.size)}
+        members |= {k for k in bent if _gain_by_position(fitter, rest, models[k]) >= least}
         order = sorted(members, key=lambda k: (-round(float(weight[k]), DIGITS), k))  # of equals the chosen
         names = [_replaced(models[k], chosen, i) for k in order]
         kept = [j for j, n in enumerate(names) if n not in names[:j]]
@@ -195,18 +199,28 @@ def _others(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -
     """Return models with another effect in the place of one of the chosen."""
     chosen = found.chosen
     name = chosen.terms[at].entry["name"]
-    kept = sorted(ent.names(rest.entries))
-    known = [
-        m
-        for m in found.alternatives
-        if sorted(ent.names(m.entries)[:-1]) == kept and m.terms[-1].entry["name"] != name and not m.at_bound
-    ]
+    known = [_with_last(fitter, m, rest) for m in found.alternatives if _one_more(m, rest, name)]
     if not known and clock.now() < ends:
         known = _looked_up(fitter, found, at, rest, ends)
     same = ent.build(chosen.terms[at].entry).equivalent()
     if same is None or not fitter.by_force or any(m.terms[-1].entry["name"] == same.name for m in known):
         return known
     return [*known, *fitted_in_time(fitter, rest, [Term.of({"name": same.name, **same.values})], math.inf)]
+
+
+def _one_more(model: Fitted, rest: Fitted, but: str) -> bool:
+    """Tell whether a model has the effects of `rest` and one more, other than `but`, and none at a bound."""
+    names = list(ent.names(model.entries))
+    if model.at_bound or but in names or len(names) != len(rest.terms) + 1:
+        return False
+    return set(ent.names(rest.entries)) < set(names)
+
+
+def _with_last(fitter: Fitter, model: Fitted, rest: Fitted) -> Fitted:
+    """Return a model with that effect last which `rest` has not."""
+    kept = ent.names(rest.entries)
+    order = sorted(model.terms, key=lambda t: t.entry["name"] not in kept)
+    return model if order == list(model.terms) else fitter.fit(order, model)
 
 
 def _looked_up(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -> list[Fitted]:

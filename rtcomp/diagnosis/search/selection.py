@@ -116,21 +116,16 @@ def search(
         _skipped(found, short)
         fit = [g for g in grown if accepted(fitter, g, _parent(g, beam), null, everything)]
         good = _distinct(sorted(fit, key=score))[:BEAM]
-        parents = {}
-        next_beam = []
-        for model in good:
-            smaller = pruned(fitter, model, passed, null, everything, ends)
-            parents[id(smaller)] = float(_parent(model, beam).errors.sum())
-            next_beam.append(smaller)
+        smaller = [pruned(fitter, model, passed, null, everything, ends) for model in good]
+        parents = {id(s): float(_parent(m, beam).errors.sum()) for s, m in zip(smaller, good, strict=True)}
         passed += good
-        beam = _distinct(sorted(next_beam, key=score))
+        beam = _distinct(sorted(smaller, key=score))
         beam = [m for m in beam if _better(fitter, m, found.chosen, null, everything)]
         if not beam:
             break
         if clock.now() < ends:
-            beam, grown = _resettled(fitter, found, beam, grown, parents, ends)
+            beam, grown = _resettled(fitter, found, beam, grown, parents, null, ends)
             everything = float(found.baseline.errors.sum())
-            beam = [m for m in beam if _better(fitter, m, found.chosen, null, everything)]
         if doubted is not None and beam and doubted(beam[0]):
             found.doubted = True
             break
@@ -250,29 +245,36 @@ def _resettled(
     beam: list[Fitted],
     grown: list[Fitted],
     parents: dict[int, float],
+    null: Null,
     ends: float,
 ) -> tuple[list[Fitted], list[Fitted]]:
     """Refit all on yield displacements that suit the best model: those of a poorer one were bent to it.
 
-    Of the models that were `grown`, those that come near the best. Its own numbers were bent as well, so both
-    are settled in turn, as long as the error falls. An effect that only made up for what was not settled is
-    left out again.
+    Of the models that were `grown`, those that come near the best. Its own numbers and form were bent as
+    well: both are settled in turn, as long as the error falls. What only made up for that is left out again.
+    Where friction yields by another law than before, only the belief is returned: all begins beside that.
     """
-    best, left, found.elsewhere = beam[0], math.inf, True
+    near = [g for g in sorted(grown, key=score) if all(g is not m for m in beam)]
+    near = [g for g in near if score(g) < score(beam[0]) + NEAR][:BEAM]
+    law, best, left, found.elsewhere = fitter.balance.exponent, beam[0], math.inf, True
+    others = [g for g in near if ent.names(g.entries) == ent.names(best.entries)]  # its other forms
     while best.sse < (1.0 - LEAST_GAIN) ** 2 * left and clock.now() < ends:
         left = best.sse
         settle(fitter, best.terms, ends)
-        best = fitter.fit(best.terms, best)
+        best, *others = sorted(_refitted(fitter, [best, *others]), key=lambda m: (m.at_bound, m.sse))
     found.baseline = fitter.fit([])
+    if fitter.balance.exponent != law:
+        parents[id(found.baseline)], found.beside = math.inf, None
+        return [found.baseline], []
     again = [best, *_refitted(fitter, beam[1:])]
     parents.update({id(new): parents[id(old)] for new, old in zip(again, beam, strict=True)})
-    near = [g for g in sorted(grown, key=score) if all(g is not m for m in beam)]
-    near = [g for g in near if score(g) < score(beam[0]) + NEAR][:BEAM]
     # On its own friction an effect may go to a bound that it kept away from on a poorer one.
     order = sorted(again, key=lambda m: (m.at_bound, score(m)))
-    first = pruned(fitter, order[0], (), found.null, float(found.baseline.errors.sum()), ends)
+    everything = float(found.baseline.errors.sum())
+    first = pruned(fitter, order[0], (), null, everything, ends)
     parents[id(first)] = parents[id(order[0])]
-    return [first, *order[1:]], [*again, *_refitted(fitter, near)]
+    kept = [m for m in (first, *order[1:]) if _better(fitter, m, found.chosen, null, everything)]
+    return kept, [*again, *_refitted(fitter, near)]
 
 
 def _refitted(fitter: Fitter, models: Sequence[Fitted]) -> list[Fitted]:
