@@ -90,10 +90,8 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         plainest = min(models[k].size for k in members)
         enough = max(weight[k] for k in members if models[k].size == plainest)
         members = {k for k in members if models[k].size == plainest or weight[k] > enough} | {0}
-        # What needs more numbers than a spring, and no more than one by another law explains, may be one.
-        wave = _may_be_no_wave(fitter, found, i)
-        bent = {k for k, m in enumerate(models) if k and (wave or m.size < chosen.size)}
-        members |= {k for k in bent if _gain_by_position(fitter, rest, models[k]) >= least}
+        if _may_be_no_wave(fitter, found, i) or _shows_no_memory(fitter, chosen, i):
+            members |= {k for k, m in enumerate(models) if k and _gain_by_position(fitter, rest, m) >= least}
         order = sorted(members, key=lambda k: (-round(float(weight[k]), DIGITS), k))  # of equals the chosen
         names = [_replaced(models[k], chosen, i) for k in order]
         kept = [j for j, n in enumerate(names) if n not in names[:j]]
@@ -169,6 +167,12 @@ def _may_be_no_wave(fitter: Fitter, found: Search, at: int) -> bool:
         return False
     more = found.null is not None and found.null.p_of_error(found.chosen.errors) < LEVEL
     return period.high >= high - low or (more and 2.0 * period.value > high - low)
+
+
+def _shows_no_memory(fitter: Fitter, chosen: Fitted, at: int) -> bool:
+    """Tell whether a chosen effect that remembers is bent to a smooth function of the position alone."""
+    entry = chosen.entries[at]
+    return ent.kind_of(entry).states > 0 and of_position(fitter.balance, entry).size > 0
 
 
 def _gain_by_position(fitter: Fitter, rest: Fitted, model: Fitted) -> float:

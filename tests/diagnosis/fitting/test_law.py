@@ -8,6 +8,8 @@ from recorded import STAGE, run, stage, there_and_back
 
 from rtcomp.diagnosis.fitting.baseline import baseline
 from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.fitting.law import law_of
 from rtcomp.diagnosis.fitting.retuned import level_and_reach
 from rtcomp.diagnosis.fitting.stage_of import bank
 from rtcomp.diagnosis.forces.balance import ForceBalance
@@ -28,6 +30,27 @@ def test_it_is_that_of_the_recording(believed: float, true: float) -> None:
     written = fitter.stage(base).friction
     assert isinstance(written, MaxwellSlip) and written.exponent == balance.exponent
     assert written.level == pytest.approx(sum(k * r for k, r in ELEMENTS), rel=0.05)
+
+
+def test_numbers_and_form_of_an_effect_that_suit_one_law_do_not_hide_another() -> None:
+    """Beside stops the fall of friction with speed is one that what sticks follows, and as good."""
+    fall = {"name": "stribeck", "rise": 0.5, "velocity": 4e-4}
+    recording = run(stage(friction=bank(ELEMENTS, 1.0), effects=[fall]), there_and_back(12.0))
+    balance = ForceBalance(stage(), load_data([recording]))
+    baseline(balance)
+    fitter = Fitter(balance)
+    balance.exponent = 0.0
+    bent = fitter.fit([Term.of({**fall, "velocity": 1e-3, "form": "exponential", "following": 1.0})])
+    assert law_of(fitter, bent.terms) == 1.0
+
+
+@pytest.mark.slow
+def test_a_fall_of_friction_with_speed_is_named_beside_any_law() -> None:
+    fall = {"name": "stribeck", "rise": 0.5, "velocity": 4e-4}
+    recording = run(stage(friction=bank(ELEMENTS, 1.0), effects=[fall]), there_and_back(12.0))
+    found = diagnose(stage(), [recording], budget=120.0)
+    assert [e.names[0] for e in found.effects] == ["stribeck"]
+    assert {r.parameter: r.after.value for r in found.retuned}["friction.exponent"] == 1.0
 
 
 @pytest.mark.slow

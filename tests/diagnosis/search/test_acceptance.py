@@ -76,3 +76,20 @@ def test_effects_that_are_a_bump_only_together_are_no_finding() -> None:
         made.append(found_in(fitter, model, null))
     assert made[0] == []
     assert made[1] == [entry["name"] for entry in terms]
+
+
+def test_what_a_poor_form_of_one_effect_leaves_is_no_room_for_another() -> None:
+    """A wave with an overtone, told as one without: an end stop makes up for some of that."""
+    axis = stage()
+    recording = run(axis, there_and_back(20.0))
+    x, span = recording.position, float(np.ptp(recording.position))
+    at = 2.0 * np.pi * x / (0.3 * span)
+    pushed = {**recording.columns, "voltage": recording.voltage + 0.2 * np.sin(at) + 0.1 * np.sin(2.0 * at)}
+    balance = ForceBalance(axis, load_data([replace(recording, columns=pushed)]))
+    base, fitter = baseline(balance), Fitter(balance)
+    wave = Term.of({"name": "cogging", "amplitude": 0.8, "period": 0.3 * span, "phase": 0.0})
+    stop = Term.of({"name": "end-stop", "stiffness": 1e4, "position": float(np.quantile(x, 0.9))})
+    model = fitter.fit([wave, stop], base)
+    null = Null(np.linspace(0.0, 0.01, 19), np.tile(1e-3 * model.errors, (19, 1)))
+    of_wave, of_stop = doubts(fitter, model, null)
+    assert not of_wave.why and "is left, more than noise" in of_stop.why
