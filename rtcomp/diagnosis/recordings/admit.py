@@ -22,6 +22,7 @@ from rtcomp.recording.reader import Recording
 from rtcomp.stage.balance import force_balance
 from rtcomp.stage.simulate import Simulator, largest_step
 from rtcomp.stage.stage import Stage
+from rtcomp.units import for_axis
 
 MIN_ROWS, MIN_SECONDS = 1000, 2.0
 """All recordings together; below, no part can be left out of the fit."""
@@ -57,9 +58,10 @@ def admit(stage: Stage, recordings: Sequence[Recording]) -> list[str]:
     _can_be_simulated(stage, recordings[0].rate_hz)
     _whole_enough(recordings)
     notes = [_named(note, r, recordings) for r in recordings for note in _fits(stage, r)]
-    notes += excitation.check(recordings)
+    unit = for_axis("m", stage.axis)
+    notes += excitation.check(recordings, unit)
     for r in recordings:
-        notes += [_named(note, r, recordings) for note in excitation.clipping(r, stage.voltage_limit)]
+        notes += [_named(note, r, recordings) for note in excitation.clipping(r, stage.voltage_limit, unit)]
     return notes + _rates(stage, recordings)
 
 
@@ -179,9 +181,10 @@ def _can_be_simulated(stage: Stage, rate_hz: float) -> None:
 def _fits(stage: Stage, recording: Recording) -> list[str]:
     """Check that the recording moves, and in the stage's units; return notes."""
     # Units between the two: a position in km looks like no motion to a sensor that counts nanometres.
-    excitation.moved(recording, 0.0)
+    unit = for_axis("m", stage.axis)
+    excitation.moved(recording, 0.0, unit)
     notes = _units(stage, recording)
-    excitation.moved(recording, _noise(stage))
+    excitation.moved(recording, _noise(stage), unit)
     return notes
 
 

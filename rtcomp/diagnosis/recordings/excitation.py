@@ -19,10 +19,11 @@ _TRUSTED = 0.5
 FEW_REVERSALS = 6
 
 
-def moved(recording: Recording, noise: float) -> None:
-    """Raise RecordingError where nothing was commanded, or nothing moved beyond the sensor's `noise` (m rms).
+def moved(recording: Recording, noise: float, unit: str) -> None:
+    """Raise RecordingError where nothing was commanded, or nothing moved beyond the sensor's `noise` (rms).
 
-    With `noise` 0 only the recording itself tells: readings that do not hang together from row to row.
+    Positions are told in `unit`. With `noise` 0 only the recording itself tells: readings that do not hang
+    together from row to row.
     """
     path, position, voltage = recording.path, recording.position, recording.voltage
     good = recording.trusted
@@ -41,21 +42,24 @@ def moved(recording: Recording, noise: float) -> None:
         floor = 8.0 * noise
         if travel <= floor:
             raise RecordingError(
-                f"{path}: nothing moved: position stays within {travel:.3g} m, which the sensor's noise and "
-                f"resolution alone make ({floor:.3g} m); command more than friction holds"
+                f"{path}: nothing moved: position stays within {travel:.3g} {unit}, which the sensor's noise "
+                f"and resolution alone make ({floor:.3g} {unit}); command more than friction holds"
             )
         return
     parts = [position[max(p.start - 2, 0) : p.stop] for p in pieces(len(position))]
     white = float(np.sqrt(np.mean([np.var(np.diff(part, 2)) for part in parts if part.size > 2]) / 6.0))
     if float(np.std(position)) < 1.5 * white:
         raise RecordingError(
-            f"{path}: nothing moved: position stays within {travel:.3g} m and is noise from row to row; "
-            "command more than friction holds"
+            f"{path}: nothing moved: position stays within {travel:.3g} {unit} and is noise from row to "
+            "row; command more than friction holds"
         )
 
 
-def clipping(recording: Recording, voltage_limit: float) -> list[str]:
-    """Return notes on columns that sit at their extremes; raise RecordingError where that is most rows."""
+def clipping(recording: Recording, voltage_limit: float, unit: str) -> list[str]:
+    """Return notes on columns that sit at their extremes; raise RecordingError where that is most rows.
+
+    Positions are told in `unit`.
+    """
     notes = []
     voltage, position = recording.voltage, recording.position
     largest = _largest(voltage)
@@ -75,7 +79,8 @@ def clipping(recording: Recording, voltage_limit: float) -> list[str]:
     if share > CLIPPED and _arrives_at_speed(position):
         raise RecordingError(
             f"{recording.path}: position is clipped: {100 * share:.0f} % of its rows are exactly "
-            f"{position.min():.6g} or {position.max():.6g} m, reached at full speed; check the sensor's range"
+            f"{position.min():.6g} or {position.max():.6g} {unit}, reached at full speed; check the sensor's "
+            "range"
         )
     if share > 10 * _SOME:
         notes.append(
@@ -95,8 +100,11 @@ def clipping(recording: Recording, voltage_limit: float) -> list[str]:
     return notes
 
 
-def check(recordings: Sequence[Recording]) -> list[str]:
-    """Return notes on the reversals of all `recordings`; raise RecordingError where there is none."""
+def check(recordings: Sequence[Recording], unit: str) -> list[str]:
+    """Return notes on the reversals of all `recordings`; raise RecordingError where there is none.
+
+    Positions are told in `unit`.
+    """
     counts = [reversals(r.position[r.trusted]) for r in recordings]
     total = sum(counts)
     if total == 0:
@@ -107,7 +115,7 @@ def check(recordings: Sequence[Recording]) -> list[str]:
             what = f"{first.path}: moves" if len(recordings) == 1 else "the recordings move"
             raise RecordingError(
                 f"{what} in one direction only ({which}, from {first.position[0]:.4g} to "
-                f"{first.position[-1]:.4g} m), without a reversal; friction and all that differs by "
+                f"{first.position[-1]:.4g} {unit}), without a reversal; friction and all that differs by "
                 "direction needs motion both ways"
             )
         return ["no recording has a reversal in it: what happens at reversals cannot be seen"]

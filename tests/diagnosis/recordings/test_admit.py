@@ -191,3 +191,9 @@ def test_measured_recordings_pass_and_their_mistakes_are_told() -> None:
     for change, says in ((scaled(1e3), "1e3 times too large"), (scaled(voltage=-1.0), "wrong sign")):
         with pytest.raises(RecordingError, match=says):
             admit(belief, [change(emps)])
+
+
+def test_a_rotary_axis_is_told_its_angles_in_radians(good: Recording) -> None:
+    axis = stage(axis="rotary")
+    with pytest.raises(RecordingError, match=r"one direction only \(up, from \S+ to \S+ rad\)"):
+        admit(axis, [one_way(good)])
