@@ -113,7 +113,10 @@ def _diagnosed(
     finish = ends - (1.0 - SEARCH) * budget
     hidden = untold(balance) > MUCH
     fitter, found = _searched(objectives, clock.until(finish, FORCES) if hidden else finish, say, seed)
-    doubtful = hidden and (found.denied or Rest.of(fitter, found).significant)
+    more = Rest.of(fitter, found).significant
+    if more and _as_believed(stage, fitter, found, seed):
+        more = False
+    doubtful = hidden and (found.denied or more)
     if doubtful and hides(fitter, found.chosen):
         if clock.now() < finish:
             fitter, found = _by_trajectory(stage, fitter, finish, say, seed)
@@ -138,6 +141,22 @@ def _diagnosed(
     return replace(done, notes=[*notes, *done.notes], not_tried=found.not_tried)
 
 
+def _as_believed(stage: Stage, fitter: Fitter, found: Search, seed: int) -> bool:
+    """Tell whether a search found nothing, and the belief as it is leaves as much of its own recordings.
+
+    What rings or chatters beyond the bandwidth looks like damping to a fit. A fitted stage that has it rings
+    less, and what its replicates leave is no measure.
+    """
+    if found.chosen.terms or found.null is None:
+        return False
+    gains = found.null.gains
+    null = null_of_belief(fitter.balance, stage, lambda data: fitter.on(data).fit([]).errors, seed, gains)
+    if null is None or not null.as_loud(found.chosen.errors, LEVEL):
+        return False
+    found.null, found.as_believed = null, True
+    return True
+
+
 def _by_trajectory(
     stage: Stage, by_force: Fitter, ends: float, say: Progress, seed: int
 ) -> tuple[Fitter, Search]:
@@ -148,7 +167,7 @@ def _by_trajectory(
     """
     believed = stage if stage.friction is not None else by_force.stage(by_force.fit([]))
     fitter = Trajectory.of(by_force.balance, believed)
-    null = null_of_belief(fitter, seed)
+    null = null_of_belief(fitter.balance, believed, lambda data: fitter.on(data).left_as_believed(), seed)
     if null is not None and null.p_of_error(fitter.left_as_believed()) > LEVEL:
         belief = fitter.as_believed()
         return fitter, Search(belief, belief, null, belief)

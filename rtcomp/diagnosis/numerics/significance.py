@@ -48,6 +48,11 @@ class Null:
         """
         return _gumbel_tail(_level(self.errors), float(_level(errors)))
 
+    def as_loud(self, errors: Floats, level: float) -> bool:
+        """Tell whether squared errors (B,) are neither larger nor smaller than chance has them."""
+        usual, value = _level(self.errors), float(_level(errors))
+        return min(_gumbel_tail(usual, value), _gumbel_tail(-usual, -value)) > level
+
     def settled(self, gain: float, errors: Floats, level: float) -> bool:
         """Tell whether neither the largest gain nor the errors left are more than chance at `level`."""
         return self.p_value(gain) > level and self.p_of_error(errors) > level

@@ -17,12 +17,14 @@ from rtcomp.diagnosis.fitting import starting
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.unbiased import numbers_of
+from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.forces.replicate import left_by
 from rtcomp.diagnosis.numerics.significance import Null, log_gain
-from rtcomp.diagnosis.positions.trajectory import Trajectory
+from rtcomp.diagnosis.recordings.data import Data
 from rtcomp.diagnosis.settings import LEVEL, REPLICATES
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
+from rtcomp.stage.stage import Stage
 
 FEW, MORE = 6, 4
 """Replicates after which what is plain is settled; so many more at a time where it is not."""
@@ -129,16 +131,26 @@ def _largest(
     return best
 
 
-def null_of_belief(fitter: Trajectory, seed: int) -> Null | None:
-    """Return what a belief, as it is, leaves of recordings of its own; None where it makes too few."""
-    stage = fitter.belief.stage
+def null_of_belief(
+    balance: ForceBalance,
+    stage: Stage,
+    left: Callable[[Data], Floats],
+    seed: int,
+    gains: Floats | None = None,
+) -> Null | None:
+    """Return what is `left` of recordings of a believed `stage`, as it is; None where it makes too few.
+
+    `gains` are those of another null distribution, which go on to count.
+    """
 
     def one(number: int) -> Floats | None:
-        data = left_by(stage, fitter.balance, 1000 * seed + number)
-        return None if data is None else fitter.on(data).left_as_believed()
+        data = left_by(stage, balance, 1000 * seed + number)
+        return None if data is None else left(data)
 
     errors = [e for e in shared(one, range(FEW)) if e is not None]
-    return Null(np.zeros(len(errors)), np.array(errors)) if len(errors) >= FEW // 2 else None
+    if len(errors) < FEW // 2:
+        return None
+    return Null(np.zeros(len(errors)) if gains is None else gains, np.array(errors))
 
 
 def _null(fitted: Fitted, found: Sequence[Drawn], chance: Floats) -> Null:

@@ -59,6 +59,8 @@ class Search:
     """Whether an effect was left out because the other objective does not show it."""
     elsewhere: bool = False
     """Whether friction is settled on another model than the chosen one."""
+    as_believed: bool = False
+    """Whether the belief, as it is, leaves as much of recordings of its own: then no number of it moved."""
 
 
 def search(

@@ -89,6 +89,7 @@ def answer(
         part = rest.share if named else 1.0
         named.append(Named(UNEXPLAINED, 1.0, {}, part, curve=left_over(left)))
     stages, moved = _stages(believed, fitter, base, final, cause)
+    moved = [] if found.as_believed else moved
     if cause is not None and cause.unit == LENGTH:
         named.append(_other_scale(fitter, believed, stages["retuned"], cause))
     verdict, matters = _verdict(named, fitter, believed, stages["retuned"], moved)

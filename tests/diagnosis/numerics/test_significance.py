@@ -68,6 +68,7 @@ def test_a_gain_like_those_of_replicates_is_chance_and_a_larger_one_is_not() -> 
     assert null.p_value(0.06) < 0.001
     assert null.p_value(null.threshold(0.01)) == pytest.approx(0.01, rel=1e-3)
     assert null.p_of_error(np.full(10, 100.0)) > 0.2 and null.p_of_error(np.full(10, 120.0)) < 0.01
+    assert [null.as_loud(np.full(10, each), 0.01) for each in (80.0, 100.0, 120.0)] == [False, True, False]
 
 
 def test_the_largest_gain_is_that_of_a_fit() -> None:
