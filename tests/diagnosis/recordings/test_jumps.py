@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from rtcomp.diagnosis.recordings.data import MOST_ROWS, RUN_IN, WINDOWS, load_data, with_rows
 from rtcomp.diagnosis.recordings.jumps import jumps
 from rtcomp.recording.outliers import answers, outliers
+from rtcomp.recording.pieces import PIECE
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.lowpass import zero_phase
 
@@ -28,6 +29,18 @@ def test_a_jump_is_found_to_the_row(seed: int, row: int, sign: float) -> None:
     at, size, _ = jumps(time, x)[0]
     assert time[row - 1] < at < time[row]
     assert size == pytest.approx(sign * 2e-6, rel=0.05)
+
+
+@pytest.mark.parametrize("row", [70_000, PIECE - 1, PIECE, PIECE + 3])
+def test_a_long_recording_is_looked_at_in_pieces_and_misses_none(row: int) -> None:
+    """Wherever it lies beside the end of a piece, and once only."""
+    rows = PIECE + 200_000
+    time = np.arange(rows) / 1e4
+    position = 1e-4 * np.sin(time) + 1e-9 * np.random.default_rng(3).standard_normal(rows)
+    position[row:] += 5e-8
+    (found,) = jumps(time, position)
+    assert found.time == pytest.approx(time[row] - 0.5e-4, abs=1e-9)
+    assert found.size == pytest.approx(5e-8, rel=0.1)
 
 
 def test_a_smooth_motion_has_none() -> None:
