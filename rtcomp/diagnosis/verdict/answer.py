@@ -20,7 +20,7 @@ from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.mismatch.curves import left_over
 from rtcomp.diagnosis.mismatch.locate import locate
 from rtcomp.diagnosis.mismatch.where import Compared, curves
-from rtcomp.diagnosis.numerics.significance import log_gain
+from rtcomp.diagnosis.numerics.significance import SURE
 from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
 from rtcomp.diagnosis.search.confidence import Alternatives
 from rtcomp.diagnosis.search.selection import Search
@@ -30,10 +30,12 @@ from rtcomp.diagnosis.verdict.experiment import next_experiment
 from rtcomp.diagnosis.verdict.one_cause import LENGTH, Cause, fixed_units, force_constant, one_cause
 from rtcomp.diagnosis.verdict.validation import Reserved
 from rtcomp.errors import ConfigError, RtcompError
+from rtcomp.kernels import Floats
 from rtcomp.stage.stage import Stage
 from rtcomp.units import for_axis, prefixed
 
 UNEXPLAINED = ("unexplained",)
+NOT_BORNE_OUT = "not named, for a stage with it leaves more than one without it"
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,9 @@ def answer(
     notes = _notes(balance, found)
     shares = _shares(base, chosen, sets)
     named = _named(fitter, chosen, spans, sets, shares, rest)
+    if named and _worse(_gains(fitter, fitter.stage(base), fitter.stage(chosen))):
+        notes.append(f"{', '.join(ent.names(chosen.entries))}: {NOT_BORNE_OUT}")
+        named = []
     final = chosen if named else base
     view = Compared(balance)
     cause = None if named or rest.significant else _cause(fitter, believed, base)
@@ -226,12 +231,21 @@ def _found(balance: ForceBalance, believed: Stage, tuned: Numbers) -> list[Retun
 
 def _matters(fitter: Fitter, believed: Stage, retuned: Stage) -> bool:
     """Tell whether other numbers of the belief bring down an error that is not small already."""
-    before, after = (fitter.left_by(stage) ** 2 for stage in (believed, retuned))
-    relative = float(np.sqrt(np.mean(before[fitter.rows])))
-    # By block, as every gain: what better numbers gain in one of them they must not lose in the others.
-    sums = [np.bincount(fitter.block, each, fitter.blocks)[fitter.use] for each in (before, after)]
-    better = log_gain(*(np.maximum(each, 1e-300) for each in sums)) > -2.0 * math.log1p(-LEAST_GAIN)
-    return better and relative > TOLERANCE
+    relative = float(np.sqrt(np.mean(fitter.left_by(believed)[fitter.rows] ** 2)))
+    least = -2.0 * math.log1p(-LEAST_GAIN)
+    return relative > TOLERANCE and float(_gains(fitter, believed, retuned).mean()) > least
+
+
+def _gains(fitter: Fitter, before: Stage, after: Stage) -> Floats:
+    """Return the gain of one stage on another in each block that was fitted, (B_use,)."""
+    left = (fitter.left_by(stage) ** 2 for stage in (before, after))
+    sums = [np.bincount(fitter.block, each, fitter.blocks)[fitter.use] for each in left]
+    return np.asarray(np.diff(-np.log(np.maximum(sums, 1e-300)), axis=0)[0])
+
+
+def _worse(gains: Floats) -> bool:
+    """Tell whether gains (B,) are plainly losses."""
+    return bool(gains.mean() + SURE * gains.std() / math.sqrt(gains.size) < 0.0)
 
 
 def _verdict(
