@@ -21,6 +21,7 @@ from rtcomp.diagnosis.forces.noise import Noise
 from rtcomp.diagnosis.forces.sticking import untold
 from rtcomp.diagnosis.mismatch.locate import locate
 from rtcomp.diagnosis.mismatch.where import Compared, as_force
+from rtcomp.diagnosis.numerics.significance import Null
 from rtcomp.diagnosis.positions.hidden import MUCH, hides
 from rtcomp.diagnosis.positions.trajectory import Trajectory
 from rtcomp.diagnosis.recordings.data import load_data
@@ -114,14 +115,13 @@ def _diagnosed(
     hidden = untold(balance) > MUCH
     fitter, found = _searched(objectives, clock.until(finish, FORCES) if hidden else finish, say, seed)
     more = Rest.of(fitter, found).significant
-    if more and _as_believed(stage, fitter, found, seed):
-        more = False
-    doubtful = hidden and (found.denied or more)
-    if doubtful and hides(fitter, found.chosen):
+    if hidden and (found.denied or more) and hides(fitter, found.chosen):
         if clock.now() < finish:
             fitter, found = _by_trajectory(stage, fitter, finish, say, seed)
         else:
             found.not_tried.append("simulated positions in the place of forces")
+    elif more and (of_belief := _as_believed(stage, fitter, found, seed)) is not None:
+        found.null, found.as_believed = of_belief, True
     say(0.0, "tell apart")
     sets = alternatives(fitter, found, ends - (1.0 - TELL_APART) * budget)
     say(0.5, "judge")
@@ -141,20 +141,17 @@ def _diagnosed(
     return replace(done, notes=[*notes, *done.notes], not_tried=found.not_tried)
 
 
-def _as_believed(stage: Stage, fitter: Fitter, found: Search, seed: int) -> bool:
-    """Tell whether a search found nothing, and the belief as it is leaves as much of its own recordings.
+def _as_believed(stage: Stage, fitter: Fitter, found: Search, seed: int) -> Null | None:
+    """Return what the belief as it is leaves of its own recordings, where that is as much; else None.
 
-    What rings or chatters beyond the bandwidth looks like damping to a fit. A fitted stage that has it rings
-    less, and what its replicates leave is no measure.
+    Asked where a search found nothing. What rings or chatters beyond the bandwidth looks like damping to a
+    fit: a fitted stage that has it rings less, and what its replicates leave is no measure.
     """
     if found.chosen.terms or found.null is None:
-        return False
+        return None
     gains = found.null.gains
     null = null_of_belief(fitter.balance, stage, lambda data: fitter.on(data).fit([]).errors, seed, gains)
-    if null is None or not null.as_loud(found.chosen.errors, LEVEL):
-        return False
-    found.null, found.as_believed = null, True
-    return True
+    return null if null is not None and null.as_loud(found.chosen.errors, LEVEL) else None
 
 
 def _by_trajectory(
