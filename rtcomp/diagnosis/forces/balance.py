@@ -34,7 +34,7 @@ from rtcomp.physics import Effect, Place
 from rtcomp.stage.balance import forces, parts_of_drive
 from rtcomp.stage.stage import Stage
 
-ROUNDING = 1e-18
+NOTHING = 1e-18
 """Part of the power of a signal that rounding makes of nothing."""
 
 
@@ -210,14 +210,14 @@ class ForceBalance(Signals):
 
         The density of a command is that of its residual times their derivative: a model whose drive side is
         smaller, or whose friction takes up whatever the drive gives (`by_load`), has explained nothing by it.
-        Where no more than ROUNDING of it is left, it is the worst there is.
+        Where no more than NOTHING of it is left, it is the worst there is.
         """
         told = y if by_load is None else y - self._whitened(by_load)[0]
         plain = self._plain_drive()
         if told is plain or self._whitening is None:
             return 1.0
         whole, left = self._swing(plain), self._swing(told)
-        return float(np.sqrt(max(whole / max(left, ROUNDING * whole), 1.0)))
+        return float(np.sqrt(max(whole / max(left, NOTHING * whole), 1.0)))
 
     def _groups(
         self, entries: Sequence[Entry], weights: Floats | None, larger: tuple[float, float] = AS_IT_IS
