@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.forces.balance import BASE, ForceBalance
-from rtcomp.diagnosis.numerics.regression import Prior, System
+from rtcomp.diagnosis.numerics.regression import Grams, Prior, System
 from rtcomp.diagnosis.settings import BELIEF_SD
+from rtcomp.kernels import Floats
 
-FURTHEST = 5.0
-"""Prior standard deviations from its believed size within which an effect may always be."""
+BELIEVABLE = 5.0
+"""Prior standard deviations by which a number may be larger than believed and need no explanation. Within so
+many of its believed size an effect may always be."""
 
 
 def as_held(balance: ForceBalance, prior: Prior) -> Prior:
@@ -62,10 +66,38 @@ def prior_of(balance: ForceBalance, terms: Sequence[Term], system: System, *, of
     for term, span in zip(believed, system.of_entry, strict=False):
         sizes = ent.sizes_of(term.entry)
         # What is believed is possible, on whichever side of nothing a search would look for it.
-        wide = FURTHEST * BELIEF_SD * np.abs(sizes)
+        wide = BELIEVABLE * BELIEF_SD * np.abs(sizes)
         low[span], high[span] = np.minimum(low[span], sizes - wide), np.maximum(high[span], sizes + wide)
         near = sizes != 0.0
         where = np.arange(span.start, span.stop)
         mean[where[near]] = sizes[near]
         precision[where[near]] = (BELIEF_SD * np.abs(sizes[near])) ** -2
     return Prior(mean, precision, low, high)
+
+
+def beyond_belief(balance: ForceBalance, model: Fitted) -> bool:
+    """Tell whether a believed number of a model is so much larger than believed that something made it so."""
+    return bool(np.any(np.abs(model.coefficients) > _most(balance, model)))
+
+
+def within_belief(balance: ForceBalance, model: Fitted) -> Fitted:
+    """Return a model with numbers as far from the belief as they may be, and what it leaves then.
+
+    What is missing may look like a number that nobody would believe: a delay of a drive that works against a
+    spring is a damping. What there is to explain is then what is left with numbers that are believed.
+    """
+    if not beyond_belief(balance, model):
+        return model
+    most, prior, columns = _most(balance, model), model.prior, model.system.columns
+    prior = replace(prior, low=np.maximum(prior.low, -most), high=np.minimum(prior.high, most))
+    grams = Grams.of(columns, model.system.y, balance.block, balance.blocks)
+    c = grams.solve(~balance.reserved, prior, model.variance)
+    errors, rest = grams.errors(c, np.flatnonzero(~balance.reserved)), model.system.y - c @ columns
+    return replace(model, coefficients=c, weights=c[balance.friction], residual=rest, errors=errors)
+
+
+def _most(balance: ForceBalance, model: Fitted) -> Floats:
+    """Return the largest believable sizes (p,) of a model's coefficients; inf where nothing is believed."""
+    believed = model.prior.mean != 0.0
+    believed[balance.faster] = False  # a change of a speed
+    return np.where(believed, (1.0 + BELIEVABLE * BELIEF_SD) * np.abs(model.prior.mean), np.inf)

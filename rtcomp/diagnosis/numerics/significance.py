@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,8 @@ class Null:
     errors: Floats
     numbers: Floats | None = None
     """(R, p + q): what a fit of each finds of the numbers that made it; None where none was made."""
+    in_full: Callable[[Any], Floats] | None = None
+    """Tells what full fits of some of them with one more effect gain, (r,); None where there are none."""
 
     @property
     def noise(self) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 
 from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.fitting.believed import beyond_belief, within_belief
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
@@ -40,15 +41,26 @@ def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, e
     before_it = ent.names(parent.entries)
     forms = fitter.other_forms(parent, next((n for n in ent.names(model.entries) if n not in before_it), ""))
     before, after = errors_beside(fitter, parent, forms), errors_beside(fitter, model, forms)
-    p = null.p_value(log_gain(before, after))
+    if null.p_value(log_gain(before, after)) >= LEVEL:
+        return False
+    believable = _as_believable(fitter, parent, model)
+    if believable is not parent:
+        parent, before = believable, believable.errors
     gained = math.sqrt(before.sum()) - math.sqrt(after.sum())
-    if p >= LEVEL or gained <= LEAST_GAIN * math.sqrt(everything):
+    if gained <= LEAST_GAIN * math.sqrt(everything):
         return False
     return fitter.relative(parent, seen=True) ** 2 - fitter.relative(model, seen=True) ** 2 > NEGLIGIBLE**2
 
 
+def _as_believable(fitter: Fitter, model: Fitted, larger: Fitted | None = None) -> Fitted:
+    """Return a model with numbers within belief, unless those of a `larger` one are beyond it as well."""
+    beyond = larger is not None and beyond_belief(fitter.balance, larger) if fitter.by_force else True
+    return model if beyond else within_belief(fitter.balance, model)
+
+
 def exhausted(fitter: Fitter, model: Fitted, everything: float) -> bool:
-    """Tell whether a model leaves too little for any further effect to matter."""
+    """Tell whether a model leaves too little for any further effect to matter, its numbers believable."""
+    model = _as_believable(fitter, model)
     little = math.sqrt(model.errors.sum()) <= LEAST_GAIN * math.sqrt(everything)
     return little or fitter.relative(model, seen=True) <= NEGLIGIBLE
 
@@ -122,7 +134,8 @@ def doubts(fitter: Fitter, chosen: Fitted, null: Null | None) -> list[Doubt]:
         why = f"{', '.join(span.bound)} at its bound" if span.bound else why
         left, elsewhere = 1.0, False
         if not why:
-            without = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
+            others = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
+            without = _as_believable(fitter, others, chosen)
             rest = in_any_form(fitter, chosen, _only_forms(fitter, chosen, (i,)))
             there = in_any_form(fitter, without, _forms_beside(fitter, chosen, (i,)))
             left = math.sqrt(

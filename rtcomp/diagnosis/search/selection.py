@@ -9,9 +9,7 @@ from dataclasses import dataclass, field, replace
 from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.candidates.effects import Candidate
-from rtcomp.diagnosis.candidates.growing import fitted_in_time, grow, with_event
 from rtcomp.diagnosis.candidates.screening import Look, Screen, Screened, look
-from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting.baseline import settle
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
@@ -19,11 +17,19 @@ from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.stage_of import bias_entry
 from rtcomp.diagnosis.numerics.significance import Null
 from rtcomp.diagnosis.search.acceptance import accepted, doubts, exhausted, pruned, score
+from rtcomp.diagnosis.search.beam import (
+    NEAR,
+    beats,
+    distinct,
+    grown_by_one,
+    grown_from,
+    in_other_forms,
+    refitted,
+    shown_by_more_than_fitting,
+)
 from rtcomp.diagnosis.search.replicates import best, null_of
 from rtcomp.diagnosis.settings import BEAM, LEAST_GAIN, LEVEL, MOST_EFFECTS
 
-NEAR = 1.0
-"""Logarithm of the error over the best one's, up to which a model is an alternative, and grown beside it."""
 LOOKED = 0.5
 """Part of the time left in which candidates are looked at; the rest is for those that are fitted in full."""
 
@@ -113,16 +119,17 @@ def search(
             else:
                 found.not_tried.append(_further(found.chosen))
             break
-        grown, short = _grown(fitter, beam, judged, null.p_value(judged.gain) < LEVEL, ends)
-        grown += _in_other_forms(fitter, found, grown, ends)
+        grown, short = grown_by_one(fitter, beam, judged, null.p_value(judged.gain) < LEVEL, ends)
+        grown += in_other_forms(fitter, found.chosen, found.alternatives, grown, ends)
         _skipped(found, short)
-        fit = [g for g in grown if accepted(fitter, g, _parent(g, beam), null, everything)]
-        good = _distinct(sorted(fit, key=score))[:BEAM]
+        fit = [g for g in grown if accepted(fitter, g, grown_from(g, beam), null, everything)]
+        good = distinct(sorted(fit, key=score))[:BEAM]
         smaller = [pruned(fitter, model, passed, null, everything, ends) for model in good]
-        parents = {id(s): float(_parent(m, beam).errors.sum()) for s, m in zip(smaller, good, strict=True)}
+        parents = {id(s): float(grown_from(m, beam).errors.sum()) for s, m in zip(smaller, good, strict=True)}
         passed += good
-        beam = _distinct(sorted(smaller, key=score))
-        beam = [m for m in beam if _better(fitter, m, found.chosen, null, everything)]
+        beam = distinct(sorted(smaller, key=score))
+        beam = [m for m in beam if beats(fitter, m, found.chosen, null, everything)]
+        beam = shown_by_more_than_fitting(beam, found.chosen, null)
         if not beam:
             break
         if clock.now() < ends:
@@ -137,52 +144,6 @@ def search(
         _offset_judged(fitter, found)
     _solid(fitter, found)
     return found
-
-
-def _grown(
-    fitter: Fitter, beam: Sequence[Fitted], seen: Look, others: bool, ends: float
-) -> tuple[list[Fitted], bool]:
-    """Return the best of the beam, beside which was `seen`, and with `others` these too, each with one more.
-
-    And whether time cut it short: another is begun only where one that takes as long would end in time.
-    """
-    began = clock.now()
-    grown = grow(fitter, beam[0], seen.candidates, seen.screened, ends)
-    near = [m for m in beam[1:] if score(m) < score(beam[0]) + NEAR]
-    for other in near if others else []:
-        moment = clock.now()
-        if 2.0 * moment - began > ends:
-            return grown, True
-        began = moment
-        grown += grow(fitter, other, *seen.beside(other), ends)
-        # Both together were begun from what the best had alone, which may be bent to do without this one.
-        last = beam[0].terms[-1:]
-        missing = [t for t in last if t.entry["name"] not in ent.names(other.entries)]
-        grown += fitted_in_time(fitter, other, missing, ends)
-    grown += with_event(fitter, beam[0], seen, ends)
-    return grown, clock.now() > ends
-
-
-def _in_other_forms(fitter: Fitter, found: Search, grown: Sequence[Fitted], ends: float) -> list[Fitted]:
-    """Return the best model with its last effect beside other forms of those before it.
-
-    The form that suits them alone may be bent to do without the last.
-    """
-    names = ent.names(found.chosen.entries)
-    larger = [g for g in grown if ent.names(g.entries)[:-1] == names]
-    if not larger:
-        return []
-    alike = [m for m in found.alternatives if ent.names(m.entries) == names and not m.at_bound]
-    near = [m for m in alike if score(m) < score(found.chosen) + NEAR]
-    last = min(larger, key=score).terms[-1:]
-    return [model for other in near for model in fitted_in_time(fitter, other, last, ends)]
-
-
-def _better(fitter: Fitter, model: Fitted, chosen: Fitted, null: Null, everything: float) -> bool:
-    """Tell whether a model beats that of the step before: a larger one by the one test."""
-    if len(model.terms) > len(chosen.terms):
-        return accepted(fitter, model, chosen, null, everything)
-    return score(model) < score(chosen)
 
 
 def _skipped(found: Search, cut: bool) -> None:
@@ -238,7 +199,7 @@ def _settled_on_chosen(fitter: Fitter, found: Search) -> None:
     settle(fitter, found.chosen.terms)
     found.baseline = fitter.fit([])
     found.chosen = fitter.fit(found.chosen.terms, found.chosen)
-    found.alternatives = _refitted(fitter, found.alternatives)
+    found.alternatives = refitted(fitter, found.alternatives)
 
 
 def _resettled(
@@ -263,25 +224,20 @@ def _resettled(
     while best.sse < (1.0 - LEAST_GAIN) ** 2 * left and clock.now() < ends:
         left = best.sse
         settle(fitter, best.terms, ends)
-        best, *others = sorted(_refitted(fitter, [best, *others]), key=lambda m: (m.at_bound, m.sse))
+        best, *others = sorted(refitted(fitter, [best, *others]), key=lambda m: (m.at_bound, m.sse))
     found.baseline = fitter.fit([])
     if fitter.balance.exponent != law:
         parents[id(found.baseline)], found.beside = math.inf, None
         return [found.baseline], []
-    again = [best, *_refitted(fitter, beam[1:])]
+    again = [best, *refitted(fitter, beam[1:])]
     parents.update({id(new): parents[id(old)] for new, old in zip(again, beam, strict=True)})
     # On its own friction an effect may go to a bound that it kept away from on a poorer one.
     order = sorted(again, key=lambda m: (m.at_bound, score(m)))
     everything = float(found.baseline.errors.sum())
     first = pruned(fitter, order[0], (), null, everything, ends)
     parents[id(first)] = parents[id(order[0])]
-    kept = [m for m in (first, *order[1:]) if _better(fitter, m, found.chosen, null, everything)]
-    return kept, [*again, *_refitted(fitter, near)]
-
-
-def _refitted(fitter: Fitter, models: Sequence[Fitted]) -> list[Fitted]:
-    """Return models fitted again, each from where it was."""
-    return shared(lambda m: fitter.fit(m.terms, m), models)
+    kept = [m for m in (first, *order[1:]) if beats(fitter, m, found.chosen, null, everything)]
+    return kept, [*again, *refitted(fitter, near)]
 
 
 def _judged(
@@ -323,21 +279,6 @@ def _sound(seen: Look, parent: float) -> Look | None:
     if seen.null is not None and seen.null.noise > parent:
         return None
     return seen
-
-
-def _parent(model: Fitted, beam: Sequence[Fitted]) -> Fitted:
-    """Return the largest model that a model was grown from."""
-    names = ent.names(model.entries)
-    own = [b for b in beam if len(b.terms) < len(names) and ent.names(b.entries) == names[: len(b.terms)]]
-    return max(own, key=lambda b: len(b.terms))
-
-
-def _distinct(models: Sequence[Fitted]) -> list[Fitted]:
-    found: list[Fitted] = []
-    for m in models:
-        if all(sorted(ent.names(m.entries)) != sorted(ent.names(f.entries)) for f in found):
-            found.append(m)
-    return found
 
 
 def _table(

@@ -1,0 +1,106 @@
+"""The beam: models kept at each step of the search, grown by one effect, and which of them go on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rtcomp.diagnosis import clock
+from rtcomp.diagnosis import entries as ent
+from rtcomp.diagnosis.candidates.growing import fitted_in_time, grow, with_event
+from rtcomp.diagnosis.candidates.screening import Look
+from rtcomp.diagnosis.cores import shared
+from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.fitted import Fitted
+from rtcomp.diagnosis.numerics.significance import Null, log_gain
+from rtcomp.diagnosis.search.acceptance import accepted, score
+from rtcomp.diagnosis.settings import LEVEL
+
+NEAR = 1.0
+"""Logarithm of the error over the best one's, up to which a model is an alternative, and grown beside it."""
+FAR_MORE = 10.0
+"""Times the largest gain of replicates from which on a full fit of them could not gain as much."""
+
+
+def grown_by_one(
+    fitter: Fitter, beam: Sequence[Fitted], seen: Look, others: bool, ends: float
+) -> tuple[list[Fitted], bool]:
+    """Return the best of the beam, beside which was `seen`, and with `others` these too, each with one more.
+
+    And whether time cut it short: another is begun only where one that takes as long would end in time.
+    """
+    began = clock.now()
+    grown = grow(fitter, beam[0], seen.candidates, seen.screened, ends)
+    near = [m for m in beam[1:] if score(m) < score(beam[0]) + NEAR]
+    for other in near if others else []:
+        moment = clock.now()
+        if 2.0 * moment - began > ends:
+            return grown, True
+        began = moment
+        grown += grow(fitter, other, *seen.beside(other), ends)
+        # Both together were begun from what the best had alone, which may be bent to do without this one.
+        last = beam[0].terms[-1:]
+        missing = [t for t in last if t.entry["name"] not in ent.names(other.entries)]
+        grown += fitted_in_time(fitter, other, missing, ends)
+    grown += with_event(fitter, beam[0], seen, ends)
+    return grown, clock.now() > ends
+
+
+def in_other_forms(
+    fitter: Fitter, chosen: Fitted, alternatives: Sequence[Fitted], grown: Sequence[Fitted], ends: float
+) -> list[Fitted]:
+    """Return the best model with its last effect beside other forms of those before it.
+
+    The form that suits them alone may be bent to do without the last.
+    """
+    names = ent.names(chosen.entries)
+    larger = [g for g in grown if ent.names(g.entries)[:-1] == names]
+    if not larger:
+        return []
+    alike = [m for m in alternatives if ent.names(m.entries) == names and not m.at_bound]
+    near = [m for m in alike if score(m) < score(chosen) + NEAR]
+    last = min(larger, key=score).terms[-1:]
+    return [model for other in near for model in fitted_in_time(fitter, other, last, ends)]
+
+
+def beats(fitter: Fitter, model: Fitted, chosen: Fitted, null: Null, everything: float) -> bool:
+    """Tell whether a model beats that of the step before: a larger one by the one test."""
+    if len(model.terms) > len(chosen.terms):
+        return accepted(fitter, model, chosen, null, everything)
+    return score(model) < score(chosen)
+
+
+def shown_by_more_than_fitting(beam: Sequence[Fitted], chosen: Fitted, null: Null) -> list[Fitted]:
+    """Return the beam from the first model on whose last effect does not gain as much on replicates.
+
+    Fitted in full there as here: what grows far from its start is little to first order.
+    """
+    for i, model in enumerate(beam):
+        larger = len(model.terms) == len(chosen.terms) + 1 and null.in_full is not None
+        gain = log_gain(chosen.errors, model.errors)
+        if not larger or null.in_full is None or gain > FAR_MORE * null.gains.max():
+            return list(beam[i:])
+        more = null.in_full(model.terms[-1]).mean() - null.gains.mean()
+        if null.p_value(gain - max(float(more), 0.0)) < LEVEL:
+            return list(beam[i:])
+    return []
+
+
+def refitted(fitter: Fitter, models: Sequence[Fitted]) -> list[Fitted]:
+    """Return models fitted again, each from where it was."""
+    return shared(lambda m: fitter.fit(m.terms, m), models)
+
+
+def grown_from(model: Fitted, beam: Sequence[Fitted]) -> Fitted:
+    """Return the largest model that a model was grown from."""
+    names = ent.names(model.entries)
+    own = [b for b in beam if len(b.terms) < len(names) and ent.names(b.entries) == names[: len(b.terms)]]
+    return max(own, key=lambda b: len(b.terms))
+
+
+def distinct(models: Sequence[Fitted]) -> list[Fitted]:
+    """Return the first of models with the same effects, in their order."""
+    found: list[Fitted] = []
+    for m in models:
+        if all(sorted(ent.names(m.entries)) != sorted(ent.names(f.entries)) for f in found):
+            found.append(m)
+    return found
