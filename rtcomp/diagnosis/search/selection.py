@@ -95,7 +95,7 @@ def search(
             at_hand = first if step == 0 else None
             known = found.beside if fitter.by_force else None
             seen = _judged(fitter, beam[0], seed + step, say, at_hand, known, ends, late=late)
-            judged = _sound(seen, parents[id(beam[0])])
+            judged = _sound(seen, beam[0], parents[id(beam[0])], found)
             if judged is None:
                 beam.pop(0)
         if judged is None or judged.null is None:
@@ -270,15 +270,20 @@ def _judged(
     return replace(seen, null=null_of(fitter, model, seen.screen, seen.gain, seed, looked, ends))
 
 
-def _sound(seen: Look, parent: float) -> Look | None:
-    """Return what was seen where its model can be judged.
+def _sound(seen: Look, model: Fitted, parent: float, before: Search) -> Look | None:
+    """Return what was seen beside a model where it can be judged, after a step `before` it.
 
     A model that explains recordings of its own no better than the one before explains the real recording has
-    shown nothing: it put the drive's force on both sides of the balance.
+    shown nothing: it put the drive's force on both sides of the balance. Nor has one that is further than
+    that from what its own recordings leave: a lag with hardly any mass makes noise less, not the mismatch.
     """
-    if seen.null is not None and seen.null.noise > parent:
-        return None
-    return seen
+    if seen.null is None or seen.null.noise > parent:
+        return seen if seen.null is None else None
+    null, last = seen.null, before.null
+    if last is None or last.numbers is None or null.numbers is None or null.p_of_error(model.errors) >= LEVEL:
+        return seen
+    further = model.errors.sum() / null.noise > before.chosen.errors.sum() / last.noise
+    return None if further and len(model.terms) > len(before.chosen.terms) else seen
 
 
 def _table(
