@@ -95,7 +95,7 @@ def search(
             at_hand = first if step == 0 else None
             known = found.beside if fitter.by_force else None
             seen = _judged(fitter, beam[0], seed + step, say, at_hand, known, ends, late=late)
-            judged = _sound(seen, beam[0], parents[id(beam[0])], found)
+            judged = sound(seen, beam[0], parents[id(beam[0])], found)
             if judged is None:
                 beam.pop(0)
         if judged is None or judged.null is None:
@@ -270,7 +270,7 @@ def _judged(
     return replace(seen, null=null_of(fitter, model, seen.screen, seen.gain, seed, looked, ends))
 
 
-def _sound(seen: Look, model: Fitted, parent: float, before: Search) -> Look | None:
+def sound(seen: Look, model: Fitted, parent: float, before: Search) -> Look | None:
     """Return what was seen beside a model where it can be judged, after a step `before` it.
 
     A model that explains recordings of its own no better than the one before explains the real recording has
