@@ -1,4 +1,4 @@
-"""A coarse sensor bends a fit; a model that would be fitted alike is what the recording may have come from."""
+"""A coarse sensor bends a fit: a model that would be fitted alike is what the recording may come from."""
 
 from __future__ import annotations
 
