@@ -24,7 +24,7 @@ from rtcomp.diagnosis.numerics.significance import SURE
 from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
 from rtcomp.diagnosis.search.confidence import Alternatives
 from rtcomp.diagnosis.search.selection import Search
-from rtcomp.diagnosis.settings import LEAST_GAIN, LEVEL, TOLERANCE
+from rtcomp.diagnosis.settings import LEAST_GAIN, LEFT, LEVEL, TOLERANCE
 from rtcomp.diagnosis.verdict.detectability import sights
 from rtcomp.diagnosis.verdict.experiment import next_experiment
 from rtcomp.diagnosis.verdict.one_cause import LENGTH, Cause, fixed_units, force_constant, one_cause
@@ -89,15 +89,18 @@ def answer(
     view = Compared(balance)
     cause = None if named or rest.significant else _cause(fitter, believed, base)
     before, after = fitter.force(base), fitter.force(final)
+    part = rest.share if named else _left_of_belief(fitter, found, believed, base)
+    slight = not named and part <= LEFT
     if rest.significant or (chosen.terms and not named):
         left = locate(view, after, None, seed, believed.axis)
-        part = rest.share if named else 1.0
-        named.append(Named(UNEXPLAINED, 1.0, {}, part, curve=left_over(left)))
+        named.append(
+            Named(UNEXPLAINED, 1.0, {}, min(part, 1.0) if named or slight else 1.0, curve=left_over(left))
+        )
     stages, moved = _stages(believed, fitter, base, final, cause)
     moved = [] if found.as_believed else moved
     if cause is not None and cause.unit == LENGTH:
         named.append(_other_scale(fitter, believed, stages["retuned"], cause))
-    verdict, matters = _verdict(named, fitter, believed, stages["retuned"], moved)
+    verdict, matters = _verdict(named, fitter, believed, stages["retuned"], moved, slight=slight)
     if not matters:
         stages["after"] = stages["retuned"] = believed
     errors = reserved.judge({"before": believed, **stages})
@@ -229,6 +232,15 @@ def _found(balance: ForceBalance, believed: Stage, tuned: Numbers) -> list[Retun
     return found
 
 
+def _left_of_belief(fitter: Fitter, found: Search, believed: Stage, base: Fitted) -> float:
+    """Return what a refitted belief leaves of what the belief leaves as it is, squared and above the noise."""
+    left, first = (
+        float(np.mean(fitter.left_by(s)[fitter.rows] ** 2)) for s in (fitter.stage(base), believed)
+    )
+    noise = min(found.null.noise / float(base.errors.sum()), 1.0) * left if found.null is not None else 0.0
+    return (left - noise) / max(first - noise, 1e-300)
+
+
 def _matters(fitter: Fitter, believed: Stage, retuned: Stage) -> bool:
     """Tell whether other numbers of the belief bring down an error that is not small already."""
     relative = float(np.sqrt(np.mean(fitter.left_by(believed)[fitter.rows] ** 2)))
@@ -249,15 +261,22 @@ def _worse(gains: Floats) -> bool:
 
 
 def _verdict(
-    named: Sequence[Named], fitter: Fitter, believed: Stage, retuned: Stage, moved: Sequence[Retuned]
+    named: Sequence[Named],
+    fitter: Fitter,
+    believed: Stage,
+    retuned: Stage,
+    moved: Sequence[Retuned],
+    *,
+    slight: bool,
 ) -> tuple[Verdict, bool]:
     """Return the verdict, and whether other numbers than the believed ones are given."""
     if any(e.names != UNEXPLAINED for e in named):
         return "missing-physics", True
     matters = bool(moved) and _matters(fitter, believed, retuned)
     if named:
-        # Numbers bent to an unknown cause may do worse on other motion; friction where none was, not.
-        return "unexplained", matters and believed.friction is None
+        # Numbers bent to an unknown cause may do worse on other motion; friction where none was, not, nor
+        # numbers that leave only a slight part to it.
+        return "unexplained", matters and (slight or believed.friction is None)
     return ("retuned", True) if matters else ("consistent", False)
 
 
