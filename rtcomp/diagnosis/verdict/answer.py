@@ -233,7 +233,7 @@ def _found(balance: ForceBalance, believed: Stage, tuned: Numbers) -> list[Retun
 
 
 def _left_of_belief(fitter: Fitter, found: Search, believed: Stage, base: Fitted) -> float:
-    """Return what a refitted belief leaves of what the belief leaves as it is, squared and above the noise."""
+    """Return what a refitted belief leaves of what the belief as it is leaves, squared, above the noise."""
     left, first = (
         float(np.mean(fitter.left_by(s)[fitter.rows] ** 2)) for s in (fitter.stage(base), believed)
     )
