@@ -115,7 +115,7 @@ def _diagnosed(
     hidden = untold(balance) > MUCH
     fitter, found = _searched(objectives, clock.until(finish, FORCES) if hidden else finish, say, seed)
     more = Rest.of(fitter, found).significant
-    if hidden and (found.denied or more) and hides(fitter, found.chosen):
+    if hidden and (found.denied or more) and (not found.chosen.terms or hides(fitter, found.chosen)):
         if clock.now() < finish:
             fitter, found = _by_trajectory(stage, fitter, finish, say, seed)
         else:
