@@ -248,7 +248,9 @@ class Diagnosis:
         """Return the verdict in one sentence."""
         named = [" or ".join(e.names) for e in self.effects if e.names != ("unexplained",)]
         if self.verdict == "consistent":
-            return "Nothing is missing: simulation and recording agree within the noise."
+            after, noise = self.fit.after, self.fit.floor
+            how = "within the noise" if after <= noise else f"to {100.0 * after:.2g} % of the force"
+            return f"Nothing is missing: simulation and recording agree {how}."
         if self.verdict == "retuned":
             moved = ", ".join(r.parameter for r in self.retuned) or "numbers that this motion does not part"
             return f"No physics is missing; other values of {moved} explain the recording."

@@ -106,6 +106,8 @@ def ready(folder: Path, example: str) -> list[str]:
         words += ["--seconds", "3", "--at-least", "5", *([] if "--fault" in words else ["--fault", "kill"])]
     if words[0] == "demo" and "--serial" in words:  # in real time, four runs one after the other
         words += ["--seconds", "12"]
+    if words[0] == "paper" and "--quick" not in words:  # in full in bench_paper
+        words += ["--quick"]
     for word in words:
         if word.endswith("model.yaml"):
             (folder / word).write_bytes((folder / "model.yaml").read_bytes())

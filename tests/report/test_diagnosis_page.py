@@ -94,7 +94,11 @@ def test_the_next_experiment_is_drawn_with_the_command_that_runs_it() -> None:
 def test_nothing_missing_says_so_without_empty_sections() -> None:
     found = made_up.consistent()
     page = page_of(found)
-    assert list(page.verdict) == ["Nothing is missing: simulation and recording agree within the noise."]
+    agree = f"to {100.0 * found.fit.after:.2g} % of the force"
+    assert found.fit.after > found.fit.floor
+    assert list(page.verdict) == [f"Nothing is missing: simulation and recording agree {agree}."]
+    quiet = replace(found, fit=replace(found.fit, after=found.fit.floor))
+    assert quiet.sentence().endswith("agree within the noise.")
     assert page.tone == "good" and math.isnan(share_explained(found))
     headings = [s.heading for s in page.sections]
     assert not any(h.startswith(("Named", "Where", "Retuned", "The next")) for h in headings)
