@@ -19,7 +19,7 @@ from rtcomp.stage.stage import Stage
 
 RUNNING = b"running\n"
 SETTLED_TICKS = 20
-MOMENTS = int(os.environ.get("RTCOMP_TEST_MOMENTS", "40"))
+MOMENTS = int(os.environ.get("RTCOMP_TEST_MOMENTS", "15"))
 """At which a host is killed or stopped in each proof."""
 
 
