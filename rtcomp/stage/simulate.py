@@ -90,15 +90,13 @@ def integrate(
         w[VOLTS] = volts
         renew(w, base[0], base[1])
         run_chain(steps, p, s, w, 0, effects)
-        within = 0.0
-        if w[DRIVE] != driven:
-            mean = w[DRIVE]
-            w[STEP], w[VOLTS], w[GAIN], w[DRIVE] = 0.0, volts, base[1], 0.0
-            run_chain(steps, p, s, w, 0, drives)
-            w[STEP] = h
-            if w[DRIVE] != mean:
-                within = mean - 0.5 * (driven + w[DRIVE])
-            driven = w[DRIVE]
+        mean, within = w[DRIVE], 0.0
+        w[STEP], w[VOLTS], w[GAIN], w[DRIVE] = 0.0, volts, base[1], 0.0
+        run_chain(steps, p, s, w, 0, drives)
+        w[STEP] = h
+        if w[DRIVE] != mean:
+            within = mean - 0.5 * (driven + w[DRIVE])
+        driven = w[DRIVE]
         a = (w[DRIVE] + w[PUSH] - w[FRICTION]) / w[MASS]
         if moved != 0.0:
             # Damping near a turning point can make this anything; outside these bounds it is no stiffness.

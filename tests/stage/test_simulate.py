@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rtcomp.hysteresis.interval import IntervalBasis
@@ -60,6 +60,7 @@ def drive(simulator, volts, period):
 
 @settings(max_examples=40, deadline=None)
 @given(delay=st.floats(1e-5, 9e-3), substeps=st.integers(1, 5))
+@example(delay=1.5e-3, substeps=2)  # a change where a step ends
 def test_a_late_command_gives_its_impulse_whenever_it_changes(delay, substeps):
     axis = stage(mass=2.0, effects=[{"name": "drive-delay", "delay": delay}])
     volts = np.random.default_rng(3).uniform(-5.0, 5.0, 40)

@@ -11,7 +11,7 @@ from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.recordings.data import load_data
-from rtcomp.diagnosis.search.selection import Search, _in_other_forms
+from rtcomp.diagnosis.search.beam import in_other_forms
 
 SINE = {"name": "cogging", "form": "sine", "amplitude": 0.1, "period": 1e-4, "phase": 0.4}
 TRIANGLE = {**SINE, "form": "triangle"}
@@ -23,9 +23,8 @@ def test_no_effect_stands_beside_itself() -> None:
     balance = ForceBalance(stage(), load_data([run(stage(effects=[SINE, STRIBECK]), there_and_back(12.0))]))
     base, fitter = baseline(balance), Fitter(balance)
     best, other, beside = (fitter.fit([Term.of(e)], base) for e in (SINE, TRIANGLE, STRIBECK))
-    found = Search(base, best, alternatives=[other])
     twice = fitter.fit([*beside.terms, *best.terms], beside)
-    assert _in_other_forms(fitter, found, [twice], math.inf) == []
+    assert in_other_forms(fitter, best, [other], [twice], math.inf) == []
     larger = fitter.fit([*best.terms, *beside.terms], best)
-    grown = _in_other_forms(fitter, found, [twice, larger], math.inf)
+    grown = in_other_forms(fitter, best, [other], [twice, larger], math.inf)
     assert [[e["name"] for e in m.entries] for m in grown] == [["cogging", "stribeck"]]
