@@ -115,12 +115,9 @@ def _diagnosed(
     hidden = untold(balance) > MUCH
     fitter, found = _searched(objectives, clock.until(finish, FORCES) if hidden else finish, say, seed)
     more = Rest.of(fitter, found).significant
-    if hidden and (found.denied or more) and (not found.chosen.terms or hides(fitter, found.chosen)):
-        if clock.now() < finish:
-            fitter, found = _by_trajectory(stage, fitter, finish, say, seed)
-        else:
-            found.not_tried.append("simulated positions in the place of forces")
-    elif more and (of_belief := _as_believed(stage, fitter, found, seed)) is not None:
+    if hidden and (found.denied or more):
+        fitter, found = _by_position(stage, fitter, found, finish, say, seed)
+    if fitter.by_force and more and (of_belief := _as_believed(stage, fitter, found, seed)) is not None:
         found.null, found.as_believed = of_belief, True
     say(0.0, "tell apart")
     sets = alternatives(fitter, found, ends - (1.0 - TELL_APART) * budget)
@@ -152,6 +149,24 @@ def _as_believed(stage: Stage, fitter: Fitter, found: Search, seed: int) -> Null
     gains = found.null.gains
     null = null_of_belief(fitter.balance, stage, lambda data: fitter.on(data).fit([]).errors, seed, gains)
     return null if null is not None and null.as_loud(found.chosen.errors, LEVEL) else None
+
+
+def _by_position(
+    stage: Stage, by_force: Fitter, found: Search, ends: float, say: Progress, seed: int
+) -> tuple[Fitter, Search]:
+    """Return the search by simulated positions where forces are no judge, or name nothing that it names.
+
+    Else what was `found` by forces. Windows are short: that positions miss nothing does not say that nothing
+    is missing where forces leave more than noise.
+    """
+    blind = hides(by_force, found.chosen)
+    if found.chosen.terms and not blind:
+        return by_force, found
+    if clock.now() > ends:
+        found.not_tried.append("simulated positions in the place of forces")
+        return by_force, found
+    fitter, other = _by_trajectory(stage, by_force, ends, say, seed)
+    return (fitter, other) if blind or other.chosen.terms else (by_force, found)
 
 
 def _by_trajectory(

@@ -264,7 +264,7 @@ def test_friction_that_grows_with_the_load_is_named(loaded: list[Recording]) -> 
     assert done.verdict == "missing-physics"
     assert "load-dependent-friction" in done.effects[0].names
     if done.position is None:  # forces tell it: nothing but noise is left of them
-        assert done.fit.after < done.fit.floor < done.fit.retuned
+        assert done.fit.after < 1.1 * done.fit.floor < done.fit.retuned
     else:
         assert done.position.after < 0.4 * done.position.retuned
         assert done.to_json()["fit"]["position_error"]["after"] == done.position.after
