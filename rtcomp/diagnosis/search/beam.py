@@ -75,9 +75,9 @@ def shown_by_more_than_fitting(beam: Sequence[Fitted], chosen: Fitted, null: Nul
     Fitted in full there as here: what grows far from its start is little to first order.
     """
     for i, model in enumerate(beam):
-        larger = len(model.terms) == len(chosen.terms) + 1 and null.in_full is not None
         gain = log_gain(chosen.errors, model.errors)
-        if not larger or null.in_full is None or gain > FAR_MORE * null.gains.max():
+        larger = len(model.terms) == len(chosen.terms) + 1
+        if null.in_full is None or not larger or gain > FAR_MORE * null.gains.max():
             return list(beam[i:])
         more = null.in_full(model.terms[-1]).mean() - null.gains.mean()
         if null.p_value(gain - max(float(more), 0.0)) < LEVEL:

@@ -9,11 +9,13 @@ Applied Econometrics 8).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
+from rtcomp.diagnosis import clock
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
@@ -26,10 +28,13 @@ ROUNDS, EACH = 4, 3
 """Times that the numbers are moved; replicates each time."""
 
 
-def matched(fitter: Fitter, fitted: Fitted, seed: int) -> Iterator[tuple[Fitted, Floats]]:
+def matched(
+    fitter: Fitter, fitted: Fitted, seed: int, ends: float = math.inf
+) -> Iterator[tuple[Fitted, Floats]]:
     """Go through models that would be fitted as `fitted` is, each with what its numbers are more, (p + q,).
 
     First with friction of the fit's shape, then of the believed one: within a count a fit does not tell it.
+    None is begun, and none goes on, after the time `ends` (clock.now).
     """
     own = fitter.balance.friction
     for weights in (fitted.weights, fitter.balance.weights):
@@ -41,6 +46,8 @@ def matched(fitter: Fitter, fitted: Fitted, seed: int) -> Iterator[tuple[Fitted,
         more[own] = weights - fitted.weights
         try:
             for i in range(ROUNDS):
+                if clock.now() > ends:
+                    return
                 numbers = _refitted(fitter, fitted, true, seed + i * EACH)
                 change = fitted.whole - numbers
                 change[0] = true.coefficients[0] * (fitted.whole[0] / numbers[0] - 1.0)  # bent in proportion

@@ -72,9 +72,7 @@ def null_of(
     null = _of_model(fitter, fitted, fitted, screen, gain, seed, full, ends)
     if not _may_be_bent(fitter, fitted, null):
         return null
-    for true, more in matched(fitter, fitted, 1000 * seed):
-        if clock.now() > ends:
-            break
+    for true, more in matched(fitter, fitted, 1000 * seed, ends):
         again = _of_model(fitter, fitted, true, screen, gain, seed, full, ends)
         if again.p_of_error(fitted.errors) > null.p_of_error(fitted.errors):
             null = replace(again, numbers=(fitted.whole - more)[None, :])
