@@ -65,14 +65,15 @@ def integrate(
     h = seconds / count
     stiffest, tangent = base[2], base[3]
     effects, drives = steps[COUNT], steps[DRIVES]
-    # The new command acts from the first instant: exchange the drive's share of the acceleration.
-    before = w[DRIVE]
+    # The new command acts from the first instant: exchange the drive's share of the acceleration. What drives
+    # push by themselves, as magnets do, is there already.
+    before, push = w[DRIVE], w[PUSH]
     w[STEP] = 0.0
     w[VOLTS] = volts
     w[GAIN] = base[1]
     w[DRIVE] = 0.0
     run_chain(steps, p, s, w, 0, drives)
-    driven = w[DRIVE]
+    driven, w[PUSH] = w[DRIVE], push
     a = w[ACCELERATION] + (driven - before) / w[MASS]
     w[STEP] = h
     x, v = w[POSITION], w[VELOCITY]
@@ -90,10 +91,10 @@ def integrate(
         w[VOLTS] = volts
         renew(w, base[0], base[1])
         run_chain(steps, p, s, w, 0, effects)
-        mean, within = w[DRIVE], 0.0
+        mean, push, within = w[DRIVE], w[PUSH], 0.0
         w[STEP], w[VOLTS], w[GAIN], w[DRIVE] = 0.0, volts, base[1], 0.0
         run_chain(steps, p, s, w, 0, drives)
-        w[STEP] = h
+        w[STEP], w[PUSH] = h, push
         if w[DRIVE] != mean:
             within = mean - 0.5 * (driven + w[DRIVE])
         driven = w[DRIVE]

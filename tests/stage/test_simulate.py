@@ -76,6 +76,18 @@ def test_a_late_command_gives_its_impulse_whenever_it_changes(delay, substeps):
     assert np.abs(found[:, 0] - np.interp(edges[1:], time, way)).max() < 4.0 * 5.0 / 2.0 * step**2 * 40
 
 
+@pytest.mark.parametrize(
+    "drive_of", [{"name": "drive-delay", "delay": 1e-12}, {"name": "back-emf", "coefficient": 1e-9}]
+)
+def test_magnets_pull_once_however_the_drive_changes_within_a_step(drive_of):
+    wave = {"name": "cogging", "amplitude": 2.0, "period": 4e-4, "phase": 0.5}
+    volts = np.random.default_rng(5).uniform(-1.0, 1.0, 200)
+    with_it, without = (
+        drive(Simulator(stage(mass=2.0, effects=[*more, wave])), volts, 1e-3) for more in ([drive_of], [])
+    )
+    np.testing.assert_allclose(with_it, without, rtol=1e-5, atol=1e-9)
+
+
 def relative(a, b):
     return np.sqrt(np.mean((a - b) ** 2) / np.mean(b**2))
 
