@@ -25,7 +25,7 @@ class Null:
     numbers: Floats | None = None
     """(R, p + q): what a fit of each finds of the numbers that made it; None where none was made."""
     in_full: Callable[[Any], Floats] | None = None
-    """Tells what full fits of some of them with one more effect gain, (r,); None where there are none."""
+    """Tells what fits of some of them gain by one more effect, (r,); None where there are none."""
 
     @property
     def noise(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from rtcomp.diagnosis import clock
@@ -17,8 +18,6 @@ from rtcomp.diagnosis.settings import LEVEL
 
 NEAR = 1.0
 """Logarithm of the error over the best one's, up to which a model is an alternative, and grown beside it."""
-FAR_MORE = 10.0
-"""Times the largest gain of replicates from which on a full fit of them could not gain as much."""
 
 
 def grown_by_one(
@@ -69,15 +68,18 @@ def beats(fitter: Fitter, model: Fitted, chosen: Fitted, null: Null, everything:
     return score(model) < score(chosen)
 
 
-def shown_by_more_than_fitting(beam: Sequence[Fitted], chosen: Fitted, null: Null) -> list[Fitted]:
-    """Return the beam from the first model on whose last effect does not gain as much on replicates.
+def shown_by_more_than_fitting(
+    beam: Sequence[Fitted], chosen: Fitted, null: Null, ends: float = math.inf
+) -> list[Fitted]:
+    """Return the beam without the models at its head whose last effect gains as much on replicates.
 
-    Fitted in full there as here: what grows far from its start is little to first order.
+    It is fitted there too: what grows far from its start gains little to first order. Not asked after the
+    time `ends` (clock.now).
     """
     for i, model in enumerate(beam):
         gain = log_gain(chosen.errors, model.errors)
         larger = len(model.terms) == len(chosen.terms) + 1
-        if null.in_full is None or not larger or gain > FAR_MORE * null.gains.max():
+        if null.in_full is None or not larger or clock.now() > ends:
             return list(beam[i:])
         more = null.in_full(model.terms[-1]).mean() - null.gains.mean()
         if null.p_value(gain - max(float(more), 0.0)) < LEVEL:

@@ -84,13 +84,12 @@ def null_of(
 def _may_be_bent(fitter: Fitter, fitted: Fitted, null: Null) -> bool:
     """Tell whether a fit leaves more than its replicates, perhaps only because its mass is biased.
 
-    By what theirs is less than its own the truth is more, about; noise of a reading goes by the mass squared,
-    and may do so again by friction that is less bent.
+    By what theirs is less than its own the truth is more, about; noise of a reading goes by the mass squared.
     """
     if not fitter.by_force or null.numbers is None or null.p_of_error(fitted.errors) >= LEVEL:
         return False
     less = float(null.numbers[:, 0].mean() / fitted.coefficients[0])
-    return null.p_of_error(fitted.errors * min(max(less, 0.0), 1.0) ** 4) >= LEVEL
+    return null.p_of_error(fitted.errors * min(max(less, 0.0), 1.0) ** 2) >= LEVEL
 
 
 def _of_model(
@@ -151,7 +150,7 @@ def _of_model(
 
 
 def _gains_of(fitter: Fitter, fitted: Fitted, stage: Stage, seed: int, term: Term) -> Floats:
-    """Return what a `term` beside a fitted model gains in full fits of a few replicates of a stage, (r,)."""
+    """Return what a `term`, as it was found, gains in short fits of a few replicates of a stage, (r,)."""
 
     def one(number: int) -> float:
         data = left_by(stage, fitter.balance, number)
@@ -160,7 +159,7 @@ def _gains_of(fitter: Fitter, fitted: Fitted, stage: Stage, seed: int, term: Ter
         other = fitter.on(data)
         again = other.fit(list(fitted.terms), fitted, steps=0)
         try:
-            larger = other.fit([*again.terms, term], again)
+            larger = other.fit([*again.terms, term], again, starting.FEW)
         except (ConfigError, np.linalg.LinAlgError):
             return 0.0
         return log_gain(again.errors, larger.errors)

@@ -129,7 +129,7 @@ def search(
         passed += good
         beam = distinct(sorted(smaller, key=score))
         beam = [m for m in beam if beats(fitter, m, found.chosen, null, everything)]
-        beam = shown_by_more_than_fitting(beam, found.chosen, null)
+        beam = shown_by_more_than_fitting(beam, found.chosen, null, ends)
         if not beam:
             break
         if clock.now() < ends:
