@@ -30,10 +30,11 @@ from rtcomp.diagnosis.search.confidence import alternatives
 from rtcomp.diagnosis.search.replicates import null_of_belief
 from rtcomp.diagnosis.search.selection import LOOKED, Search, search
 from rtcomp.diagnosis.search.ways import Left, alike, doubted
-from rtcomp.diagnosis.settings import BUDGET, LEFT, LEVEL
+from rtcomp.diagnosis.settings import BUDGET, LEFT, LEVEL, TOLERANCE
 from rtcomp.diagnosis.verdict.answer import Rest, answer
 from rtcomp.diagnosis.verdict.validation import Reserved
 from rtcomp.errors import RtcompError
+from rtcomp.kernels import Floats
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
 
@@ -139,15 +140,24 @@ def _diagnosed(
 
 
 def _as_believed(stage: Stage, fitter: Fitter, found: Search, seed: int) -> Null | None:
-    """Return what the belief as it is leaves of its own recordings, where that is as much; else None.
+    """Return what fits of the belief leave of its own recordings, where that is as much; else None.
 
     Asked where a search found nothing. What rings or chatters beyond the bandwidth looks like damping to a
-    fit: a fitted stage that has it rings less, and what its replicates leave is no measure.
+    fit: a fitted stage that has it rings less, and what its replicates leave is no measure. As it is, too,
+    the belief must agree with the recording, or leave no more of it than of its own.
     """
     if found.chosen.terms or found.null is None:
         return None
-    gains = found.null.gains
-    null = null_of_belief(fitter.balance, stage, lambda data: fitter.on(data).fit([]).errors, seed, gains)
+
+    def as_it_is(one: Fitter) -> Floats:
+        return np.asarray(np.bincount(one.block, one.left_by(stage) ** 2, one.blocks)[one.use])
+
+    gains, balance, unfitted = found.null.gains, fitter.balance, as_it_is(fitter)
+    if unfitted.sum() > TOLERANCE**2 * np.count_nonzero(fitter.rows):
+        null = null_of_belief(balance, stage, lambda data: as_it_is(fitter.on(data)), seed)
+        if null is None or null.p_of_error(unfitted) < LEVEL:
+            return None
+    null = null_of_belief(balance, stage, lambda data: fitter.on(data).fit([]).errors, seed, gains)
     return null if null is not None and null.as_loud(found.chosen.errors, LEVEL) else None
 
 

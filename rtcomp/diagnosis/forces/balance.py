@@ -25,7 +25,7 @@ from rtcomp.diagnosis.forces.noise import Noise, Whitening
 from rtcomp.diagnosis.forces.reaches import MOST_OWN, joined
 from rtcomp.diagnosis.forces.sides import exact
 from rtcomp.diagnosis.forces.signals import BASE, Signals
-from rtcomp.diagnosis.forces.sticking import trust
+from rtcomp.diagnosis.forces.sticking import Told
 from rtcomp.diagnosis.numerics.regression import System
 from rtcomp.diagnosis.numerics.spectrum import filtered, spectrum
 from rtcomp.diagnosis.recordings.data import Data, Segment
@@ -49,7 +49,7 @@ class ForceBalance(Signals):
         """N^2: mean square of what the sensor's noise makes of the residual below the motion's bandwidth."""
         self.block: np.ndarray = np.zeros(0, dtype=np.int64)
         self._reserved: np.ndarray = np.zeros(0, dtype=np.bool_)
-        self._trust = np.ones(1)
+        self._told: Told | None = None
         self.level = np.inf
         """N, of which friction may do any part unseen where the axis seems to rest; where unknown, any."""
 
@@ -70,13 +70,13 @@ class ForceBalance(Signals):
         held = float(np.sum(coefficients[self.friction] * self.reaches)) + own
         believed = float(np.sum(self.weights * self.reaches)) + own
         self.level = max(held, believed) if self.stage.friction is not None or held > 0.0 else np.inf
-        self._weigh()
         self.block, self._reserved = cut(self)
         self.blocks = self._reserved.size
+        self._weigh()
 
     def _weigh(self) -> None:
-        self._trust = np.ones(1)
-        self._trust = trust(self)
+        self._told = None
+        self._told = Told.of(self)
 
     def put(self, reaches: Floats, step: float) -> None:
         """Put the grid of yield displacements (m) to `reaches`, in steps of `step` (logarithm)."""
@@ -262,7 +262,7 @@ class ForceBalance(Signals):
     def _swing(self, y: Floats) -> float:
         """Return the power of what a constant does not change."""
         rows = ~self.reserved[self.block]
-        swung, weight = y[rows], np.broadcast_to(self._trust, y.shape)[rows]
+        swung, weight = y[rows], self.weighed(np.ones((1, y.size)))[0, rows]
         return float(np.mean((swung - (weight @ swung) / (weight @ weight) * weight) ** 2))
 
     # -- rows, whitened and joined over the segments ------------------------------------------------------
@@ -284,12 +284,18 @@ class ForceBalance(Signals):
             wanted = slice(rows.start - kept.start, rows.stop - kept.start, rows.step)
             response = self._whitening.response
             parts.append(filtered(table[:, kept], self.data.rate, response, noisy=True, wanted=wanted))
-        return np.asarray(self._trust * np.concatenate(parts, axis=1))
+        return self.weighed(np.concatenate(parts, axis=1))
+
+    def weighed(self, rows: Floats) -> Floats:
+        """Return what counts of filtered `rows` (p, n), which may be changed."""
+        if self._told is not None:
+            self._told.weigh(rows)
+        return rows
 
     @property
     def trust(self) -> Floats:
         """Weight of each compared row, (n,): below 1 where motion does not tell what friction does."""
-        return self._trust
+        return np.ones(1) if self._told is None else self._told.trust
 
     def both_sides(self, stage: Stage) -> tuple[Floats, Floats]:
         """Return the force of the drive and the force that the motion needs (N, (n,)) by any `stage`.

@@ -7,6 +7,7 @@ and what it does to friction is part of that of the residual.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,21 +23,64 @@ COUNTS = 1.5
 """How far a reading may go about at rest, in counts of the sensor."""
 
 
-def trust(balance: ForceBalance) -> Floats:
-    """Return the weight of each compared row, (n,): 1 where motion tells what friction does.
+@dataclass(frozen=True)
+class Told:
+    """What each compared row of a force balance tells, where friction may have done something unseen.
 
-    Else residuals there have the variance of noise, 1, and that of what friction may have done besides:
-    weighted least squares. It followed the drive's force, up or down, by as much as that went up and down in
-    a stretch of rest, or by all that friction can do.
+    Friction followed the drive's force, up or down, by as much as that went up and down in a stretch of rest,
+    or by all that it can do. Residuals of a stretch have the variance of noise, 1, and that of this course:
+    generalised least squares (Aitken 1935). However many rows a stretch has, it is one unknown.
     """
-    if balance.stage.sensor.resolution == 0.0:
-        return np.ones(balance.plain([s.time for s in balance.data.segments]).size)
-    random = np.random.default_rng(7)
-    unseen = [
-        random.choice((-1.0, 1.0), (int(stretch[-1]) + 1, DRAWS))[stretch] * course[:, None]
-        for course, stretch in _unseen(balance)
-    ]
-    return np.asarray(1.0 / np.sqrt(1.0 + np.mean(balance.compared(unseen) ** 2, axis=0)))
+
+    trust: Floats
+    """Weight of each row, (n,): 1 where motion tells what friction does, for it may go another way too."""
+    along: Floats
+    """Weighed rows of a stretch become less by this, (n,), times its product with them: by their course."""
+    first: np.ndarray
+    """First row of each stretch, and n."""
+
+    @classmethod
+    def of(cls, balance: ForceBalance) -> Told:
+        """Return what the rows of a balance tell that does not weigh them yet."""
+        if balance.stage.sensor.resolution == 0.0:
+            rows = balance.plain([s.time for s in balance.data.segments]).size
+            return cls(np.ones(rows), np.zeros(rows), np.array([0, rows]))
+        random, unseen = np.random.default_rng(7), _unseen(balance)
+        drawn = [
+            random.choice((-1.0, 1.0), (int(stretch[-1]) + 1, DRAWS))[stretch] * course[:, None]
+            for course, stretch in unseen
+        ]
+        trust = 1.0 / np.sqrt(1.0 + np.mean(balance.compared(drawn) ** 2, axis=0))
+        course = trust * balance.compared([course for course, _ in unseen])[0]
+        befores = np.cumsum([0.0, *(1.0 + stretch[-1] for _, stretch in unseen)])
+        stretch = balance.plain([n + stretch for n, (_, stretch) in zip(befores, unseen, strict=False)])
+        begins = (np.diff(stretch) != 0.0) | (np.diff(balance.block) != 0)
+        first = np.concatenate([[0], np.flatnonzero(begins) + 1, [course.size]])
+        return cls(trust, along(course, first), first)
+
+    def weigh(self, rows: Floats) -> None:
+        """Make of filtered rows (p, n), in their place, what counts of them."""
+        rows *= self.trust
+        _less(rows, self.along, self.first)
+
+
+def along(course: Floats, first: np.ndarray) -> Floats:
+    """Return the `Told.along` (n,) of a `course` (n,) that stretches from each `first` row on took or not."""
+    power = np.add.reduceat(course**2, first[:-1])
+    size = (1.0 - 1.0 / np.sqrt(1.0 + power)) / np.maximum(power, 1e-300)
+    return np.asarray(course * np.repeat(np.sqrt(size), np.diff(first)))
+
+
+@compiled
+def _less(rows: Floats, along: Floats, first: np.ndarray) -> None:
+    for row in rows:
+        for one in range(first.size - 1):
+            part = 0.0
+            for k in range(first[one], first[one + 1]):
+                part += along[k] * row[k]
+            if part != 0.0:
+                for k in range(first[one], first[one + 1]):
+                    row[k] -= part * along[k]
 
 
 def untold(balance: ForceBalance) -> float:

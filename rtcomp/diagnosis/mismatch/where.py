@@ -71,7 +71,7 @@ def as_force(balance: ForceBalance, residual: Floats) -> Floats:
 
 def as_white(balance: ForceBalance, force: Floats) -> Floats:
     """Return a force (N, (n,)) on the compared rows as a whitened residual: the inverse of `as_force`."""
-    return balance.trust * _weighed(balance, force, balance.whitening.white)
+    return np.asarray(balance.weighed(_weighed(balance, force, balance.whitening.white)[None])[0])
 
 
 def as_seen(balance: ForceBalance, force: Floats) -> Floats:
