@@ -185,15 +185,15 @@ class Look:
         """The largest gain, 0 where no candidate was looked at."""
         return max((s.gain for s in self.screened), default=0.0)
 
-    def beside(self, other: Fitted) -> tuple[list[Candidate], list[Screened]]:
+    def beside(self, other: Fitted, only: str | None = None) -> tuple[list[Candidate], list[Screened]]:
         """Return the candidates that another model does not have, and their gains beside that.
 
         What an effect changes is much the same beside either; where it begins to be fitted is all that is
-        needed.
+        needed. `only` names the effect that is asked for, if it is one.
         """
         own = ent.names(other.entries)
         pairs = zip(self.candidates, self.screen.beside(other), strict=True)
-        found = [pair for pair in pairs if pair[0].name not in own]
+        found = [pair for pair in pairs if pair[0].name not in own and only in (None, pair[0].name)]
         return [candidate for candidate, _ in found], [gain for _, gain in found]
 
 

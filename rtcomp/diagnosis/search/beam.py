@@ -21,25 +21,27 @@ NEAR = 1.0
 
 
 def grown_by_one(
-    fitter: Fitter, beam: Sequence[Fitted], seen: Look, others: bool, ends: float
+    fitter: Fitter, beam: Sequence[Fitted], seen: Look, alone: Look, others: bool, ends: float
 ) -> tuple[list[Fitted], bool]:
     """Return the best of the beam, beside which was `seen`, and with `others` these too, each with one more.
 
     And whether time cut it short: another is begun only where one that takes as long would end in time.
+    The last effect of the best is begun anew beside each of the others, from where it would begin `alone`:
+    the best may be bent to do without that.
     """
     began = clock.now()
     grown = grow(fitter, beam[0], seen.candidates, seen.screened, ends)
-    near = [m for m in beam[1:] if score(m) < score(beam[0]) + NEAR]
-    for other in near if others else []:
+    for other in beam[1:]:
         moment = clock.now()
         if 2.0 * moment - began > ends:
             return grown, True
         began = moment
-        grown += grow(fitter, other, *seen.beside(other), ends)
-        # Both together were begun from what the best had alone, which may be bent to do without this one.
-        last = beam[0].terms[-1:]
-        missing = [t for t in last if t.entry["name"] not in ent.names(other.entries)]
-        grown += fitted_in_time(fitter, other, missing, ends)
+        if others and score(other) < score(beam[0]) + NEAR:
+            grown += grow(fitter, other, *seen.beside(other), ends)
+        last = [t for t in beam[0].terms[-1:] if t.entry["name"] not in ent.names(other.entries)]
+        for term in last:
+            grown += grow(fitter, other, *alone.beside(other, only=term.entry["name"]), ends)
+        grown += fitted_in_time(fitter, other, last, ends)
     grown += with_event(fitter, beam[0], seen, ends)
     return grown, clock.now() > ends
 

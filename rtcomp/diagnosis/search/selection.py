@@ -88,6 +88,7 @@ def search(
     beam, parents = [baseline], {id(baseline): math.inf}
     grown: list[Fitted] = []
     passed: list[Fitted] = []
+    alone: Look | None = None
     for step in range(MOST_EFFECTS + 1):
         judged = None
         while beam and judged is None:
@@ -101,6 +102,7 @@ def search(
         if judged is None or judged.null is None:
             break
         null = judged.null
+        alone = judged if not beam[0].terms or alone is None else alone
         before = replace(found)
         found.chosen = found.replicated = beam[0]
         found.null, found.beside = null, judged.candidates or None
@@ -119,7 +121,8 @@ def search(
             else:
                 found.not_tried.append(_further(found.chosen))
             break
-        grown, short = grown_by_one(fitter, beam, judged, null.p_value(judged.gain) < LEVEL, ends)
+        more = null.p_value(judged.gain) < LEVEL
+        grown, short = grown_by_one(fitter, beam, judged, alone, more, ends)
         grown += in_other_forms(fitter, found.chosen, found.alternatives, grown, ends)
         _skipped(found, short)
         fit = [g for g in grown if accepted(fitter, g, grown_from(g, beam), null, everything)]

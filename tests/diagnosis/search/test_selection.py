@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 
-from recorded import run, stage, there_and_back
+import numpy as np
+from recorded import RATE, run, stage, there_and_back
 
-from rtcomp.diagnosis.fitting.baseline import baseline
+from rtcomp.diagnosis.candidates.screening import Look, Screen, look
+from rtcomp.diagnosis.fitting.baseline import baseline, settle
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.recordings.data import load_data
-from rtcomp.diagnosis.search.beam import in_other_forms
+from rtcomp.diagnosis.search.beam import grown_by_one, in_other_forms
+from rtcomp.physics import catalogue
 
 SINE = {"name": "cogging", "form": "sine", "amplitude": 0.1, "period": 1e-4, "phase": 0.4}
 TRIANGLE = {**SINE, "form": "triangle"}
@@ -28,3 +31,29 @@ def test_no_effect_stands_beside_itself() -> None:
     larger = fitter.fit([*best.terms, *beside.terms], best)
     grown = in_other_forms(fitter, best, [other], [twice, larger], math.inf)
     assert [[e["name"] for e in m.entries] for m in grown] == [["cogging", "stribeck"]]
+
+
+def test_an_effect_that_is_bent_to_do_without_another_is_begun_anew_beside_that() -> None:
+    """A fall of friction with speed ten times too large takes up what a spring does."""
+    reaches = np.array([1.5e-6, 3.5e-6, 7e-6, 1.3e-5, 2.4e-5, 4e-5])
+    friction = [{"stiffness": 0.7 / r, "reach": r} for r in reaches.tolist()]
+    fall = {"name": "stribeck", "form": "gaussian", "rise": 0.41, "velocity": 9.2e-4}
+    spring = {"name": "parallel-spring", "stiffness": 2390.0}
+    t = np.arange(8.0 * RATE) / RATE
+    waves = 6e-4 * np.sin(1.95 * t) + 1.5e-4 * np.sin(8.2 * t + 1.0) + 6e-5 * np.sin(19.5 * t)
+    recording = run(stage(friction=friction, effects=[fall, spring]), (1.0 - np.exp(-2.0 * t)) * waves)
+    balance = ForceBalance(stage(friction=friction), load_data([recording]))
+    base, fitter = baseline(balance), Fitter(balance)
+    alone = look(fitter, base, without=[k.name for k in catalogue.entries() if k.name != "stribeck"])
+    start = {"name": "stribeck", "form": "root", "rise": 5.0, "velocity": 8e-3}
+    bent = fitter.fit([Term.of(start)], base)
+    settle(fitter, bent.terms)
+    bent, other = fitter.fit(bent.terms, bent), fitter.fit([Term.of(spring)], base)
+    assert bent.sse < 0.2 * other.sse
+    assert fitter.fit([*bent.terms, *other.terms], bent).sse > 0.5 * bent.sse
+    nothing = Look([], [], Screen([], fitter))
+    grown, cut = grown_by_one(fitter, [bent, other], nothing, alone, False, math.inf)
+    best = min(grown, key=lambda model: model.sse)
+    assert not cut and best.sse < 0.1 * bent.sse
+    (_, found) = best.entries
+    assert abs(found["rise"] - 0.41) < 0.03 and abs(found["velocity"] - 9.2e-4) < 5e-5
