@@ -15,7 +15,7 @@ from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
-from rtcomp.diagnosis.settings import FULL_FITS, LEAST_GAIN
+from rtcomp.diagnosis.settings import FULL_FITS
 from rtcomp.errors import ConfigError
 
 
@@ -23,10 +23,11 @@ def grow(
     fitter: Fitter, model: Fitted, made: Sequence[Candidate], screened: Sequence[Screened], ends: float
 ) -> list[Fitted]:
     """Return the model with each of the best candidates, fitted in full."""
-    families: dict[str, list[Term]] = {}
+    families: dict[str, list[tuple[float, Term]]] = {}
     for i in np.argsort([-s.gain for s in screened], kind="stable").tolist():
-        families.setdefault(made[i].family, []).append(started(made[i], screened[i].sizes))
-    terms = fitter.rough(model, list(families.values()), FULL_FITS, ends)
+        start = (screened[i].left, started(made[i], screened[i].sizes))
+        families.setdefault(made[i].family, []).append(start)
+    terms = fitter.rough(model, [_likeliest(starts) for starts in families.values()], FULL_FITS, ends)
     # First order is no guide to what is behind a play: its own motion is followed from place to place.
     behind = {c.name: c.term for c in made if fitter.by_force and ent.kind_of(c.term.entry).behind}
     terms = [t for t in terms if t.entry["name"] not in behind]
@@ -35,16 +36,21 @@ def grow(
     return [*found, *fitted_in_time(fitter, model, in_better_form(fitter, found, ends), ends)]
 
 
-def with_event(fitter: Fitter, model: Fitted, seen: Look, ends: float) -> list[Fitted]:
-    """Return the model with an event and one more effect, where the event alone explains what matters.
+def _likeliest(starts: list[tuple[float, Term]]) -> list[Term]:
+    """Return starts of an effect by gain, but second the one that leaves the least squared error.
 
-    Of the mean over the blocks a single event is little, and where it is large nothing else shows beside it.
+    The gain is a mean over blocks, each by its own error: while another effect is missing, what is right in a
+    few loud ones may be worse than nothing in many quiet ones.
     """
+    least = min(range(len(starts)), key=lambda i: starts[i][0])
+    order = sorted(range(len(starts)), key=lambda i: (i != 0, i != least))
+    return [starts[i][1] for i in order]
+
+
+def events_of(fitter: Fitter, model: Fitted, seen: Look, ends: float) -> list[Fitted]:
+    """Return the model with each event, fitted: of the mean over the blocks what happens once is little."""
     events = [c.term for c in seen.candidates if not c.looked and ent.happens_once(ent.kind_of(c.term.entry))]
-    best = min(fitted_in_time(fitter, model, events, ends), key=lambda one: one.sse, default=model)
-    if not best.sse < (1.0 - LEAST_GAIN) ** 2 * model.sse:
-        return []
-    return grow(fitter, best, *seen.beside(best), ends)
+    return fitted_in_time(fitter, model, events, ends)
 
 
 def in_better_form(fitter: Fitter, found: Sequence[Fitted], ends: float) -> list[Term]:

@@ -22,11 +22,14 @@ from rtcomp.kernels import Floats
 
 @dataclass(frozen=True)
 class Screened:
-    """Gain of a candidate: mean over the blocks of log(squared error without / with it), and its sizes."""
+    """What a candidate does to the squared error of blocks left out, to first order, and its sizes."""
 
     gain: float
+    """Mean over the blocks of log(squared error without / with it)."""
     sizes: Floats
     """(q,) of its columns."""
+    left: float
+    """Squared error with it, of all blocks."""
 
 
 class Screen:
@@ -112,8 +115,8 @@ class Screen:
         floor = 1e-9 * np.array([p.rr for p in parts]) + 1e-300
         gain = np.mean(np.log(np.maximum(before, floor) / np.maximum(after, floor)), axis=1)
         return [
-            Screened(float(g), d[:n] / s[:n])
-            for g, d, s, n in zip(gain, sizes, self._scale, self._sizes, strict=True)
+            Screened(float(g), d[:n] / s[:n], float(left))
+            for g, d, s, n, left in zip(gain, sizes, self._scale, self._sizes, after.sum(axis=1), strict=True)
         ]
 
     def explained(self, model: Fitted) -> Floats:

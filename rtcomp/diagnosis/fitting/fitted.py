@@ -53,9 +53,8 @@ class Fitted:
 
     @property
     def at_bound(self) -> bool:
-        """Tell whether a nonlinear parameter of the last term, or the mass, came out at its bound."""
-        last = len(self.terms) - 1
-        return self.weightless or any(f.at_bound(self.terms) for f in self.free if f.term == last)
+        """Tell whether a nonlinear parameter of its effects, or the mass, came out at its bound."""
+        return self.weightless or any(f.at_bound(self.terms) for f in self.free)
 
     @property
     def weightless(self) -> bool:

@@ -7,43 +7,59 @@ from collections.abc import Sequence
 
 from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.candidates.growing import fitted_in_time, grow, with_event
+from rtcomp.diagnosis.candidates.growing import events_of, fitted_in_time, grow
 from rtcomp.diagnosis.candidates.screening import Look
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.numerics.significance import Null, log_gain
 from rtcomp.diagnosis.search.acceptance import accepted, score
-from rtcomp.diagnosis.settings import LEVEL
+from rtcomp.diagnosis.settings import LEAST_GAIN, LEVEL
 
 NEAR = 1.0
 """Logarithm of the error over the best one's, up to which a model is an alternative, and grown beside it."""
 
 
-def grown_by_one(
-    fitter: Fitter, beam: Sequence[Fitted], seen: Look, alone: Look, others: bool, ends: float
+def grown_further(
+    fitter: Fitter, beam: Sequence[Fitted], seen: Look, alone: Look, everything: float, ends: float
 ) -> tuple[list[Fitted], bool]:
-    """Return the best of the beam, beside which was `seen`, and with `others` these too, each with one more.
+    """Return the best of the beam, beside which was `seen`, with one effect more or two, and so the others.
 
     And whether time cut it short: another is begun only where one that takes as long would end in time.
     The last effect of the best is begun anew beside each of the others, from where it would begin `alone`:
-    the best may be bent to do without that.
+    the best may be bent to do without that. Where nothing seen passes the test, the others have that only.
     """
-    began = clock.now()
-    grown = grow(fitter, beam[0], seen.candidates, seen.screened, ends)
+    began, more = clock.now(), seen.null is not None and seen.null.p_value(seen.gain) < LEVEL
+    found = grow(fitter, beam[0], seen.candidates, seen.screened, ends)
+    found += _with_another(fitter, beam[0], seen, found, everything, ends)
     for other in beam[1:]:
         moment = clock.now()
         if 2.0 * moment - began > ends:
-            return grown, True
+            return found, True
         began = moment
-        if others and score(other) < score(beam[0]) + NEAR:
-            grown += grow(fitter, other, *seen.beside(other), ends)
+        if more and score(other) < score(beam[0]) + NEAR:
+            found += grow(fitter, other, *seen.beside(other), ends)
         last = [t for t in beam[0].terms[-1:] if t.entry["name"] not in ent.names(other.entries)]
         for term in last:
-            grown += grow(fitter, other, *alone.beside(other, only=term.entry["name"]), ends)
-        grown += fitted_in_time(fitter, other, last, ends)
-    grown += with_event(fitter, beam[0], seen, ends)
-    return grown, clock.now() > ends
+            found += grow(fitter, other, *alone.beside(other, only=term.entry["name"]), ends)
+        found += fitted_in_time(fitter, other, last, ends)
+    return found, clock.now() > ends
+
+
+def _with_another(
+    fitter: Fitter, model: Fitted, seen: Look, one_more: Sequence[Fitted], everything: float, ends: float
+) -> list[Fitted]:
+    """Return a model with two effects more: the one that leaves the least, and each that may go with it.
+
+    Where that one passes the test, its turn comes. Else the second may be why: what is right in a few loud
+    blocks is nothing in many quiet ones that the second fills, and beside an event nothing shows.
+    """
+    best = min([*one_more, *events_of(fitter, model, seen, ends)], key=lambda m: m.sse, default=model)
+    if best.sse >= (1.0 - LEAST_GAIN) ** 2 * model.sse or best.at_bound:
+        return []
+    if accepted(fitter, best, model, seen.null, everything):
+        return []
+    return grow(fitter, best, *seen.beside(best), ends)
 
 
 def in_other_forms(

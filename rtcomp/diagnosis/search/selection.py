@@ -21,8 +21,8 @@ from rtcomp.diagnosis.search.beam import (
     NEAR,
     beats,
     distinct,
-    grown_by_one,
     grown_from,
+    grown_further,
     in_other_forms,
     refitted,
     shown_by_more_than_fitting,
@@ -121,8 +121,7 @@ def search(
             else:
                 found.not_tried.append(_further(found.chosen))
             break
-        more = null.p_value(judged.gain) < LEVEL
-        grown, short = grown_by_one(fitter, beam, judged, alone, more, ends)
+        grown, short = grown_further(fitter, beam, judged, alone, everything, ends)
         grown += in_other_forms(fitter, found.chosen, found.alternatives, grown, ends)
         _skipped(found, short)
         fit = [g for g in grown if accepted(fitter, g, grown_from(g, beam), null, everything)]

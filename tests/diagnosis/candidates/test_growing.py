@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from recorded import run, stage, there_and_back
 
-from rtcomp.diagnosis.candidates.growing import grow, with_event
+from rtcomp.diagnosis.candidates.growing import grow
 from rtcomp.diagnosis.fitting.baseline import baseline
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.free import Term
@@ -57,19 +57,3 @@ def test_a_size_that_first_order_makes_larger_than_it_may_be_is_tried_at_half() 
     for true, taken in ((-0.5, -0.5 * FULL), (-0.8, -FULL)):
         (found,) = as_they_are(lambda t, true=true: abs(float(t.entry["change"]) - true), [[drift]], math.inf)
         assert found.entry["change"] == pytest.approx(taken)
-
-
-def test_a_large_event_and_what_it_hides_are_found_together() -> None:
-    """Alone neither explains much of most blocks: the reading jumps once; the lag shows beside it only."""
-    jump, lag = {"size": 6e-5, "time": 9.0}, {"time_constant": 4e-3}
-    there = [{"name": "sensor-jump", **jump}, {"name": "drive-lag", **lag}]
-    balance = ForceBalance(stage(), load_data([run(stage(effects=there), there_and_back(20.0))]))
-    base, fitter = baseline(balance), Fitter(balance)
-    found = with_event(fitter, base, look(fitter, base), math.inf)
-    best = min(found, key=lambda model: model.sse)
-    assert [term.entry["name"] for term in best.terms] == ["sensor-jump", "drive-lag"]
-    assert best.terms[0].entry["size"] == pytest.approx(6e-5, rel=0.01)
-    assert best.sse < 1e-2 * base.sse
-    quiet = ForceBalance(stage(), load_data([run(stage(effects=there[1:]), there_and_back(20.0))]))
-    base, fitter = baseline(quiet), Fitter(quiet)
-    assert not with_event(fitter, base, look(fitter, base), math.inf)
