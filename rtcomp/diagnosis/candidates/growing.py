@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -18,16 +19,20 @@ from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.settings import FULL_FITS
 from rtcomp.errors import ConfigError
 
+Start = tuple[Candidate, Screened]
+Kind = TypeVar("Kind")
+
 
 def grow(
     fitter: Fitter, model: Fitted, made: Sequence[Candidate], screened: Sequence[Screened], ends: float
 ) -> list[Fitted]:
     """Return the model with each of the best candidates, fitted in full."""
-    families: dict[str, list[tuple[float, Term]]] = {}
-    for i in np.argsort([-s.gain for s in screened], kind="stable").tolist():
-        start = (screened[i].left, started(made[i], screened[i].sizes))
-        families.setdefault(made[i].family, []).append(start)
-    terms = fitter.rough(model, [_likeliest(starts) for starts in families.values()], FULL_FITS, ends)
+    families: dict[str, list[Start]] = {}
+    for candidate, some in zip(made, screened, strict=True):
+        families.setdefault(candidate.family, []).append((candidate, some))
+    starts = [_likeliest(each, lambda s: s[1].gain, lambda s: s[1].left) for each in families.values()]
+    order = _likeliest(starts, lambda each: each[0][1].gain, lambda each: min(s.left for _, s in each))
+    terms = fitter.rough(model, [[started(c, s.sizes) for c, s in each] for each in order], FULL_FITS, ends)
     # First order is no guide to what is behind a play: its own motion is followed from place to place.
     behind = {c.name: c.term for c in made if fitter.by_force and ent.kind_of(c.term.entry).behind}
     terms = [t for t in terms if t.entry["name"] not in behind]
@@ -36,15 +41,19 @@ def grow(
     return [*found, *fitted_in_time(fitter, model, in_better_form(fitter, found, ends), ends)]
 
 
-def _likeliest(starts: list[tuple[float, Term]]) -> list[Term]:
-    """Return starts of an effect by gain, but second the one that leaves the least squared error.
+def _likeliest(
+    some: Sequence[Kind], gain: Callable[[Kind], float], left: Callable[[Kind], float]
+) -> list[Kind]:
+    """Return some by gain, but second what leaves the least squared error.
 
     The gain is a mean over blocks, each by its own error: while another effect is missing, what is right in a
     few loud ones may be worse than nothing in many quiet ones.
     """
-    least = min(range(len(starts)), key=lambda i: starts[i][0])
-    order = sorted(range(len(starts)), key=lambda i: (i != 0, i != least))
-    return [starts[i][1] for i in order]
+    order = sorted(some, key=gain, reverse=True)
+    least = min(range(len(order)), key=lambda i: left(order[i]), default=0)
+    if least > 1:
+        order.insert(1, order.pop(least))
+    return order
 
 
 def events_of(fitter: Fitter, model: Fitted, seen: Look, ends: float) -> list[Fitted]:

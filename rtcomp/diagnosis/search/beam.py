@@ -1,4 +1,4 @@
-"""The beam: models kept at each step of the search, grown by one effect, and which of them go on."""
+"""The beam: models kept at each step of the search, grown by one effect or two, and which of them go on."""
 
 from __future__ import annotations
 
