@@ -21,9 +21,9 @@ NEAR = 1.0
 
 
 def grown_further(
-    fitter: Fitter, beam: Sequence[Fitted], seen: Look, alone: Look, everything: float, ends: float
+    fitter: Fitter, beam: Sequence[Fitted], seen: Look, alone: Look, ends: float
 ) -> tuple[list[Fitted], bool]:
-    """Return the best of the beam, beside which was `seen`, with one effect more or two, and so the others.
+    """Return the best of the beam, beside which was `seen`, with one effect more, and so the others.
 
     And whether time cut it short: another is begun only where one that takes as long would end in time.
     The last effect of the best is begun anew beside each of the others, from where it would begin `alone`:
@@ -31,7 +31,6 @@ def grown_further(
     """
     began, more = clock.now(), seen.null is not None and seen.null.p_value(seen.gain) < LEVEL
     found = grow(fitter, beam[0], seen.candidates, seen.screened, ends)
-    found += _with_another(fitter, beam[0], seen, found, everything, ends)
     for other in beam[1:]:
         moment = clock.now()
         if 2.0 * moment - began > ends:
@@ -46,18 +45,16 @@ def grown_further(
     return found, clock.now() > ends
 
 
-def _with_another(
-    fitter: Fitter, model: Fitted, seen: Look, one_more: Sequence[Fitted], everything: float, ends: float
+def with_two(
+    fitter: Fitter, model: Fitted, seen: Look, one_more: Sequence[Fitted], ends: float
 ) -> list[Fitted]:
     """Return a model with two effects more: the one that leaves the least, and each that may go with it.
 
-    Where that one passes the test, its turn comes. Else the second may be why: what is right in a few loud
-    blocks is nothing in many quiet ones that the second fills, and beside an event nothing shows.
+    For where none passes the test alone. The second may be why: what is right in a few loud blocks is worse
+    than nothing in many quiet ones that the second fills, and beside an event nothing shows.
     """
     best = min([*one_more, *events_of(fitter, model, seen, ends)], key=lambda m: m.sse, default=model)
     if best.sse >= (1.0 - LEAST_GAIN) ** 2 * model.sse or best.at_bound:
-        return []
-    if accepted(fitter, best, model, seen.null, everything):
         return []
     return grow(fitter, best, *seen.beside(best), ends)
 

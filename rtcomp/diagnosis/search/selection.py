@@ -26,6 +26,7 @@ from rtcomp.diagnosis.search.beam import (
     in_other_forms,
     refitted,
     shown_by_more_than_fitting,
+    with_two,
 )
 from rtcomp.diagnosis.search.replicates import best, null_of
 from rtcomp.diagnosis.settings import BEAM, LEAST_GAIN, LEVEL, MOST_EFFECTS
@@ -121,10 +122,13 @@ def search(
             else:
                 found.not_tried.append(_further(found.chosen))
             break
-        grown, short = grown_further(fitter, beam, judged, alone, everything, ends)
+        grown, short = grown_further(fitter, beam, judged, alone, ends)
         grown += in_other_forms(fitter, found.chosen, found.alternatives, grown, ends)
-        _skipped(found, short)
         fit = [g for g in grown if accepted(fitter, g, grown_from(g, beam), null, everything)]
+        if not fit:
+            grown += (pairs := with_two(fitter, beam[0], judged, grown, ends))
+            fit = [g for g in pairs if accepted(fitter, g, beam[0], null, everything)]
+        _skipped(found, short or clock.now() > ends)
         good = distinct(sorted(fit, key=score))[:BEAM]
         smaller = [pruned(fitter, model, passed, null, everything, ends) for model in good]
         parents = {id(s): float(grown_from(m, beam).errors.sum()) for s, m in zip(smaller, good, strict=True)}
