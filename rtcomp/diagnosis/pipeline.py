@@ -43,7 +43,7 @@ STICKS = (
     "the axis sticks finer than its sensor sees, which leaves {:.2g} % of the force open to friction: "
     "judged by position, simulated over {:.2g} s from points of the recording"
 )
-SEARCH, TELL_APART = 0.75, 0.9
+SEARCH, TELL_APART = 0.8, 0.9
 """Parts of the budget at which the search ends, and what then tells its models apart."""
 FORCES = 0.5
 """Part of the time for the search after which positions may have to judge instead of forces."""

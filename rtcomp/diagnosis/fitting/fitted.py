@@ -53,8 +53,12 @@ class Fitted:
 
     @property
     def at_bound(self) -> bool:
-        """Tell whether a nonlinear parameter of its effects, or the mass, came out at its bound."""
-        return self.weightless or any(f.at_bound(self.terms) for f in self.free)
+        """Tell whether a nonlinear parameter of the last term, or the mass, came out at its bound.
+
+        One before it may be bent to do without the next: that effect is left out again when it is found.
+        """
+        last = len(self.terms) - 1
+        return self.weightless or any(f.at_bound(self.terms) for f in self.free if f.term == last)
 
     @property
     def weightless(self) -> bool:

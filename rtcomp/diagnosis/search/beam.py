@@ -26,8 +26,9 @@ def grown_further(
     """Return the best of the beam, beside which was `seen`, with one effect more, and so the others.
 
     And whether time cut it short: another is begun only where one that takes as long would end in time.
-    The last effect of the best is begun anew beside each of the others, from where it would begin `alone`:
-    the best may be bent to do without that. Where nothing seen passes the test, the others have that only.
+    The last effect of the best stands beside each of the others too. Beside one that leaves far more, or
+    where nothing seen passes the test, it is all that does, begun anew from where it would begin `alone`:
+    the best may be bent to do without the other.
     """
     began, more = clock.now(), seen.null is not None and seen.null.p_value(seen.gain) < LEVEL
     found = grow(fitter, beam[0], seen.candidates, seen.screened, ends)
@@ -36,11 +37,11 @@ def grown_further(
         if 2.0 * moment - began > ends:
             return found, True
         began = moment
+        last = [t for t in beam[0].terms[-1:] if t.entry["name"] not in ent.names(other.entries)]
         if more and score(other) < score(beam[0]) + NEAR:
             found += grow(fitter, other, *seen.beside(other), ends)
-        last = [t for t in beam[0].terms[-1:] if t.entry["name"] not in ent.names(other.entries)]
-        for term in last:
-            found += grow(fitter, other, *alone.beside(other, only=term.entry["name"]), ends)
+        elif last:
+            found += grow(fitter, other, *alone.beside(other, only=last[0].entry["name"]), ends)
         found += fitted_in_time(fitter, other, last, ends)
     return found, clock.now() > ends
 
