@@ -72,9 +72,6 @@ class ForceBalance(Signals):
         self.level = max(held, believed) if self.stage.friction is not None or held > 0.0 else np.inf
         self.block, self._reserved = cut(self)
         self.blocks = self._reserved.size
-        self._weigh()
-
-    def _weigh(self) -> None:
         self._told = None
         self._told = Told.of(self)
 
@@ -101,7 +98,7 @@ class ForceBalance(Signals):
         other.level, other.exponent, other.let_go = self.level, self.exponent, self.let_go
         other._cache = Cache(KEPT_ONCE)
         if self._whitening is not None:
-            other._weigh()
+            other._told = Told.of(other)
         return other
 
     @property
@@ -269,8 +266,7 @@ class ForceBalance(Signals):
 
     def _whitened(self, group: Group) -> Floats:
         """Return a group's columns (p, n), filtered, thinned and joined."""
-        found: Floats = self._cache.of(group.key, lambda: [self.compared(group.make())])[0]
-        return found
+        return np.asarray(self._cache.of(group.key, lambda: [self.compared(group.make())])[0])
 
     def compared(self, made: list[Floats]) -> Floats:
         """Return signals (K, p) or (K,), one array a segment, filtered, thinned, weighed, joined: (p, n)."""
@@ -286,10 +282,10 @@ class ForceBalance(Signals):
             parts.append(filtered(table[:, kept], self.data.rate, response, noisy=True, wanted=wanted))
         return self.weighed(np.concatenate(parts, axis=1))
 
-    def weighed(self, rows: Floats) -> Floats:
-        """Return what counts of filtered `rows` (p, n), which may be changed."""
+    def weighed(self, rows: Floats, *, back: bool = False) -> Floats:
+        """Return what counts of filtered `rows` (p, n), which may be changed; `back`: these rows of that."""
         if self._told is not None:
-            self._told.weigh(rows)
+            (self._told.unweigh if back else self._told.weigh)(rows)
         return rows
 
     @property

@@ -61,7 +61,12 @@ class Told:
     def weigh(self, rows: Floats) -> None:
         """Make of filtered rows (p, n), in their place, what counts of them."""
         rows *= self.trust
-        _less(rows, self.along, self.first)
+        _moved(rows, self.along, self.first, False)
+
+    def unweigh(self, rows: Floats) -> None:
+        """Make of what counts of rows (p, n) the filtered rows again, in their place."""
+        _moved(rows, self.along, self.first, True)
+        rows /= self.trust
 
 
 def along(course: Floats, first: np.ndarray) -> Floats:
@@ -72,15 +77,18 @@ def along(course: Floats, first: np.ndarray) -> Floats:
 
 
 @compiled
-def _less(rows: Floats, along: Floats, first: np.ndarray) -> None:
+def _moved(rows: Floats, along: Floats, first: np.ndarray, back: bool) -> None:
+    """Take from rows what `Told.along` takes, or give it `back` (Sherman, Morrison 1950)."""
     for row in rows:
         for one in range(first.size - 1):
-            part = 0.0
+            part = power = 0.0
             for k in range(first[one], first[one + 1]):
                 part += along[k] * row[k]
+                power += along[k] ** 2
             if part != 0.0:
+                size = part / (1.0 - power) if back else -part
                 for k in range(first[one], first[one + 1]):
-                    row[k] -= part * along[k]
+                    row[k] += size * along[k]
 
 
 def untold(balance: ForceBalance) -> float:

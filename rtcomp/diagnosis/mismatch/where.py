@@ -66,7 +66,8 @@ class Compared:
 
 def as_force(balance: ForceBalance, residual: Floats) -> Floats:
     """Return a whitened residual (n,) as a force (N): its spectrum coloured again."""
-    return _weighed(balance, residual / balance.trust, balance.whitening.coloured)
+    white = balance.weighed(residual[None].copy(), back=True)[0]
+    return _weighed(balance, white, balance.whitening.coloured)
 
 
 def as_white(balance: ForceBalance, force: Floats) -> Floats:

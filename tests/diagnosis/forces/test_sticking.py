@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rtcomp.diagnosis.forces.sticking import Told, along
@@ -14,6 +14,7 @@ from rtcomp.diagnosis.forces.sticking import Told, along
 COURSES = st.lists(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=6), min_size=1, max_size=4)
 
 
+@settings(deadline=None)  # the first compiles
 @given(COURSES)
 def test_residuals_of_a_course_that_was_taken_or_not_are_white(courses: list[list[float]]) -> None:
     """Their covariance is that of noise and of the course of each stretch; weighed rows have none."""
@@ -26,6 +27,8 @@ def test_residuals_of_a_course_that_was_taken_or_not_are_white(courses: list[lis
     for begin, end in pairwise(first):
         covariance[begin:end, begin:end] += np.outer(course[begin:end], course[begin:end])
     assert weight @ covariance @ weight.T == pytest.approx(np.eye(course.size), abs=1e-6)
+    told.unweigh(weight)
+    assert weight == pytest.approx(np.eye(course.size), abs=1e-6)
 
 
 def test_however_many_rows_a_rest_has_its_course_counts_as_one() -> None:
