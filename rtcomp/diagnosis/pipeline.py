@@ -143,8 +143,8 @@ def _as_believed(stage: Stage, fitter: Fitter, found: Search, seed: int) -> Null
     """Return what fits of the belief leave of its own recordings, where that is as much; else None.
 
     Asked where a search found nothing. What rings or chatters beyond the bandwidth looks like damping to a
-    fit: a fitted stage that has it rings less, and what its replicates leave is no measure. As it is, too,
-    the belief must agree with the recording, or leave no more of it than of its own.
+    fit: a fitted stage that has it rings less, and what its replicates leave is no measure. The
+    unfitted belief must also agree with the recording, or have no larger error than on its own replicates.
     """
     if found.chosen.terms or found.null is None:
         return None

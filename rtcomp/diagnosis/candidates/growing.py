@@ -30,8 +30,8 @@ def grow(
     families: dict[str, list[Start]] = {}
     for candidate, some in zip(made, screened, strict=True):
         families.setdefault(candidate.family, []).append((candidate, some))
-    starts = [_likeliest(each, lambda s: s[1].gain, lambda s: s[1].left) for each in families.values()]
-    order = _likeliest(starts, lambda each: each[0][1].gain, lambda each: min(s.left for _, s in each))
+    starts = [likeliest(each, lambda s: s[1].gain, lambda s: s[1].left) for each in families.values()]
+    order = likeliest(starts, lambda each: each[0][1].gain, lambda each: min(s.left for _, s in each))
     terms = fitter.rough(model, [[started(c, s.sizes) for c, s in each] for each in order], FULL_FITS, ends)
     # First order is no guide to what is behind a play: its own motion is followed from place to place.
     behind = {c.name: c.term for c in made if fitter.by_force and ent.kind_of(c.term.entry).behind}
@@ -41,13 +41,13 @@ def grow(
     return [*found, *fitted_in_time(fitter, model, in_better_form(fitter, found, ends), ends)]
 
 
-def _likeliest(
+def likeliest(
     some: Sequence[Kind], gain: Callable[[Kind], float], left: Callable[[Kind], float]
 ) -> list[Kind]:
-    """Return some by gain, but second what leaves the least squared error.
+    """Sort by gain, largest first, and move the item with the smallest squared error to second place.
 
-    The gain is a mean over blocks, each by its own error: while another effect is missing, what is right in a
-    few loud ones may be worse than nothing in many quiet ones.
+    The gain averages over blocks, relative to the error of each. While another effect is missing, a correct
+    start may reduce the error in a few blocks only, and so have a negative gain.
     """
     order = sorted(some, key=gain, reverse=True)
     least = min(range(len(order)), key=lambda i: left(order[i]), default=0)
@@ -57,7 +57,7 @@ def _likeliest(
 
 
 def events_of(fitter: Fitter, model: Fitted, seen: Look, ends: float) -> list[Fitted]:
-    """Return the model with each event, fitted: of the mean over the blocks what happens once is little."""
+    """Return the model with each single event, fitted; their gain, a mean over blocks, is small."""
     events = [c.term for c in seen.candidates if not c.looked and ent.happens_once(ent.kind_of(c.term.entry))]
     return fitted_in_time(fitter, model, events, ends)
 

@@ -55,7 +55,7 @@ class Fitted:
     def at_bound(self) -> bool:
         """Tell whether a nonlinear parameter of the last term, or the mass, came out at its bound.
 
-        One before it may be bent to do without the next: that effect is left out again when it is found.
+        Earlier terms do not count: their values may compensate for an effect that is not found yet.
         """
         last = len(self.terms) - 1
         return self.weightless or any(f.at_bound(self.terms) for f in self.free if f.term == last)

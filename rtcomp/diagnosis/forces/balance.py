@@ -25,7 +25,7 @@ from rtcomp.diagnosis.forces.noise import Noise, Whitening
 from rtcomp.diagnosis.forces.reaches import MOST_OWN, joined
 from rtcomp.diagnosis.forces.sides import exact
 from rtcomp.diagnosis.forces.signals import BASE, Signals
-from rtcomp.diagnosis.forces.sticking import Told
+from rtcomp.diagnosis.forces.sticking import RestWeights
 from rtcomp.diagnosis.numerics.regression import System
 from rtcomp.diagnosis.numerics.spectrum import filtered, spectrum
 from rtcomp.diagnosis.recordings.data import Data, Segment
@@ -49,7 +49,7 @@ class ForceBalance(Signals):
         """N^2: mean square of what the sensor's noise makes of the residual below the motion's bandwidth."""
         self.block: np.ndarray = np.zeros(0, dtype=np.int64)
         self._reserved: np.ndarray = np.zeros(0, dtype=np.bool_)
-        self._told: Told | None = None
+        self._rest: RestWeights | None = None
         self.level = np.inf
         """N, of which friction may do any part unseen where the axis seems to rest; where unknown, any."""
 
@@ -72,8 +72,8 @@ class ForceBalance(Signals):
         self.level = max(held, believed) if self.stage.friction is not None or held > 0.0 else np.inf
         self.block, self._reserved = cut(self)
         self.blocks = self._reserved.size
-        self._told = None
-        self._told = Told.of(self)
+        self._rest = None
+        self._rest = RestWeights.of(self)
 
     def put(self, reaches: Floats, step: float) -> None:
         """Put the grid of yield displacements (m) to `reaches`, in steps of `step` (logarithm)."""
@@ -98,7 +98,7 @@ class ForceBalance(Signals):
         other.level, other.exponent, other.let_go = self.level, self.exponent, self.let_go
         other._cache = Cache(KEPT_ONCE)
         if self._whitening is not None:
-            other._told = Told.of(other)
+            other._rest = RestWeights.of(other)
         return other
 
     @property
@@ -283,15 +283,15 @@ class ForceBalance(Signals):
         return self.weighed(np.concatenate(parts, axis=1))
 
     def weighed(self, rows: Floats, *, back: bool = False) -> Floats:
-        """Return what counts of filtered `rows` (p, n), which may be changed; `back`: these rows of that."""
-        if self._told is not None:
-            (self._told.unweigh if back else self._told.weigh)(rows)
+        """Weigh filtered `rows` (p, n) in place, or undo that (`back`), and return them."""
+        if self._rest is not None:
+            (self._rest.unweigh if back else self._rest.weigh)(rows)
         return rows
 
     @property
     def trust(self) -> Floats:
         """Weight of each compared row, (n,): below 1 where motion does not tell what friction does."""
-        return np.ones(1) if self._told is None else self._told.trust
+        return np.ones(1) if self._rest is None else self._rest.trust
 
     def both_sides(self, stage: Stage) -> tuple[Floats, Floats]:
         """Return the force of the drive and the force that the motion needs (N, (n,)) by any `stage`.

@@ -24,8 +24,8 @@ COUNTS = 1.5
 
 
 @dataclass(frozen=True)
-class Told:
-    """What each compared row of a force balance tells, where friction may have done something unseen.
+class RestWeights:
+    """Weights of the compared rows of a force balance, where friction may have acted unseen.
 
     Friction followed the drive's force, up or down, by as much as that went up and down in a stretch of rest,
     or by all that it can do. Residuals of a stretch have the variance of noise, 1, and that of this course:
@@ -33,15 +33,15 @@ class Told:
     """
 
     trust: Floats
-    """Weight of each row, (n,): 1 where motion tells what friction does, for it may go another way too."""
+    """Weight of each row, (n,): 1 where the motion determines the friction force."""
     along: Floats
-    """Weighed rows of a stretch become less by this, (n,), times its product with them: by their course."""
+    """Scaled course of each stretch, (n,): weighed rows lose their projection on it in part."""
     first: np.ndarray
     """First row of each stretch, and n."""
 
     @classmethod
-    def of(cls, balance: ForceBalance) -> Told:
-        """Return what the rows of a balance tell that does not weigh them yet."""
+    def of(cls, balance: ForceBalance) -> RestWeights:
+        """Return the weights of a balance that has none yet."""
         if balance.stage.sensor.resolution == 0.0:
             rows = balance.plain([s.time for s in balance.data.segments]).size
             return cls(np.ones(rows), np.zeros(rows), np.array([0, rows]))
@@ -59,18 +59,18 @@ class Told:
         return cls(trust, along(course, first), first)
 
     def weigh(self, rows: Floats) -> None:
-        """Make of filtered rows (p, n), in their place, what counts of them."""
+        """Weigh filtered rows (p, n), in place."""
         rows *= self.trust
         _moved(rows, self.along, self.first, False)
 
     def unweigh(self, rows: Floats) -> None:
-        """Make of what counts of rows (p, n) the filtered rows again, in their place."""
+        """Undo `weigh` on rows (p, n), in place."""
         _moved(rows, self.along, self.first, True)
         rows /= self.trust
 
 
 def along(course: Floats, first: np.ndarray) -> Floats:
-    """Return the `Told.along` (n,) of a `course` (n,) that stretches from each `first` row on took or not."""
+    """Return `RestWeights.along` (n,) of the `course` (n,) of stretches that begin at `first`."""
     power = np.add.reduceat(course**2, first[:-1])
     size = (1.0 - 1.0 / np.sqrt(1.0 + power)) / np.maximum(power, 1e-300)
     return np.asarray(course * np.repeat(np.sqrt(size), np.diff(first)))
@@ -78,7 +78,7 @@ def along(course: Floats, first: np.ndarray) -> Floats:
 
 @compiled
 def _moved(rows: Floats, along: Floats, first: np.ndarray, back: bool) -> None:
-    """Take from rows what `Told.along` takes, or give it `back` (Sherman, Morrison 1950)."""
+    """Apply ``I - along along^T`` to each stretch of rows, or `back` its inverse (Sherman, Morrison 1950)."""
     for row in rows:
         for one in range(first.size - 1):
             part = power = 0.0

@@ -26,9 +26,9 @@ def grown_further(
     """Return the best of the beam, beside which was `seen`, with one effect more, and so the others.
 
     And whether time cut it short: another is begun only where one that takes as long would end in time.
-    The last effect of the best stands beside each of the others too. Beside one that leaves far more, or
-    where nothing seen passes the test, it is all that does, begun anew from where it would begin `alone`:
-    the best may be bent to do without the other.
+    Each other model is also fitted with the last effect of the best. If that model has a much larger error,
+    or no candidate passes the test, only this effect is added. Its fit then starts from the values that the
+    look beside the belief `alone` gives, because the fitted values may compensate for what is missing.
     """
     began, more = clock.now(), seen.null is not None and seen.null.p_value(seen.gain) < LEVEL
     found = grow(fitter, beam[0], seen.candidates, seen.screened, ends)
@@ -49,10 +49,10 @@ def grown_further(
 def with_two(
     fitter: Fitter, model: Fitted, seen: Look, one_more: Sequence[Fitted], ends: float
 ) -> list[Fitted]:
-    """Return a model with two effects more: the one that leaves the least, and each that may go with it.
+    """Return a model with two more effects: the one with the smallest squared error, and each candidate.
 
-    For where none passes the test alone. The second may be why: what is right in a few loud blocks is worse
-    than nothing in many quiet ones that the second fills, and beside an event nothing shows.
+    Used where no effect passes the test alone. The test averages over blocks. A correct effect may reduce the
+    error in a few blocks only, while a second missing effect dominates the others.
     """
     best = min([*one_more, *events_of(fitter, model, seen, ends)], key=lambda m: m.sse, default=model)
     if best.sse >= (1.0 - LEAST_GAIN) ** 2 * model.sse or best.at_bound:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from recorded import run, stage, there_and_back
 
-from rtcomp.diagnosis.candidates.growing import grow
+from rtcomp.diagnosis.candidates.growing import grow, likeliest
 from rtcomp.diagnosis.fitting.baseline import baseline
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.free import Term
@@ -57,3 +57,16 @@ def test_a_size_that_first_order_makes_larger_than_it_may_be_is_tried_at_half() 
     for true, taken in ((-0.5, -0.5 * FULL), (-0.8, -FULL)):
         (found,) = as_they_are(lambda t, true=true: abs(float(t.entry["change"]) - true), [[drift]], math.inf)
         assert found.entry["change"] == pytest.approx(taken)
+
+
+@given(st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(0.0, 9.0)), max_size=6, unique=True))
+def test_starts_are_sorted_by_gain_but_the_smallest_error_is_among_the_first_two(
+    some: list[tuple[float, float]],
+) -> None:
+    found = likeliest(some, lambda one: one[0], lambda one: one[1])
+    assert sorted(found) == sorted(some)
+    if some:
+        assert found[0][0] == max(gain for gain, _ in some)
+        assert min(left for _, left in found[:STARTS]) == min(left for _, left in some)
+    rest = found[2:]
+    assert rest == sorted(rest, key=lambda one: -one[0])

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtcomp.diagnosis.forces.sticking import Told, along
+from rtcomp.diagnosis.forces.sticking import RestWeights, along
 
 COURSES = st.lists(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=6), min_size=1, max_size=4)
 
@@ -20,7 +20,7 @@ def test_residuals_of_a_course_that_was_taken_or_not_are_white(courses: list[lis
     """Their covariance is that of noise and of the course of each stretch; weighed rows have none."""
     first = np.cumsum([0, *(len(one) for one in courses)])
     course = np.concatenate(courses)
-    told = Told(np.ones(course.size), along(course, first), first)
+    told = RestWeights(np.ones(course.size), along(course, first), first)
     weight = np.eye(course.size)
     told.weigh(weight)
     covariance = np.eye(course.size)
@@ -34,5 +34,5 @@ def test_residuals_of_a_course_that_was_taken_or_not_are_white(courses: list[lis
 def test_however_many_rows_a_rest_has_its_course_counts_as_one() -> None:
     for rows in (1, 100, 10_000):
         course = np.full((1, rows), 50.0)
-        Told(np.ones(rows), along(course[0], np.array([0, rows])), np.array([0, rows])).weigh(course)
+        RestWeights(np.ones(rows), along(course[0], np.array([0, rows])), np.array([0, rows])).weigh(course)
         assert np.sum(course**2) == pytest.approx(1.0, rel=1e-3)

@@ -34,7 +34,7 @@ def test_no_effect_stands_beside_itself() -> None:
     assert [[e["name"] for e in m.entries] for m in grown] == [["cogging", "stribeck"]]
 
 
-def test_an_effect_that_is_bent_to_do_without_another_is_begun_anew_beside_that() -> None:
+def test_an_effect_that_compensates_for_another_is_fitted_again_beside_it() -> None:
     """A fall of friction with speed ten times too large takes up what a spring does."""
     reaches = np.array([1.5e-6, 3.5e-6, 7e-6, 1.3e-5, 2.4e-5, 4e-5])
     friction = [{"stiffness": 0.7 / r, "reach": r} for r in reaches.tolist()]
