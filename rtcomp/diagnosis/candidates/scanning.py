@@ -127,8 +127,8 @@ def _left(fitter: Fitter, model: Fitted, term: Term, ends: float) -> Callable[..
             return math.inf  # as good as rigid, and many steps
         try:
             for _ in range(turns):
-                _, _, _, c, sse = fitter.solve([*model.terms, term.with_entry(entry)], at_hand, 1.0)
-                at_hand = c[fitter.balance.friction]
+                found = fitter.solve([*model.terms, term.with_entry(entry)], at_hand, 1.0)
+                at_hand, sse = found.c[fitter.balance.friction], found.sse
         except (ConfigError, np.linalg.LinAlgError):
             return math.inf
         return sse

@@ -131,20 +131,21 @@ def with_offset(fitter: Fitter, fitted: Fitted) -> Fitted:
     return fitted
 
 
-def settle(fitter: Fitter, terms: Sequence[Term] = (), ends: float = math.inf) -> None:
+def settle(fitter: Fitter, terms: Sequence[Term] = (), ends: float = math.inf, *, law: bool = True) -> None:
     """Put yield displacements, smoothing, the speed of micro-damping and timing to what `terms` have.
 
-    As far as the time `ends` (clock.now) allows: each is begun only before.
+    And the `law` by which friction yields, where that is asked for. As far as the time `ends` (clock.now)
+    allows: each is begun only before.
     """
-    for step in (_put_friction, _smooth, partial(_damp, ends=ends), put_in_step):
+    for step in (partial(_put_friction, law=law), _smooth, partial(_damp, ends=ends), put_in_step):
         if fitter.by_force and clock.now() < ends:
             step(fitter, terms)
 
 
-def _put_friction(fitter: Fitter, terms: Sequence[Term]) -> None:
-    """Put yield displacements, and the law by which friction yields there, to what `terms` have."""
+def _put_friction(fitter: Fitter, terms: Sequence[Term], *, law: bool) -> None:
+    """Put yield displacements, and the `law` by which friction yields there, to what `terms` have."""
     _put_grid(fitter, terms)
-    exponent = law_of(fitter, terms)
+    exponent = law_of(fitter, terms) if law else fitter.balance.exponent
     if exponent != fitter.balance.exponent:
         fitter.balance.exponent = exponent
         _put_grid(fitter, terms)

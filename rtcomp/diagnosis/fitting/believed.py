@@ -12,7 +12,7 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.forces.balance import BASE, ForceBalance
-from rtcomp.diagnosis.numerics.regression import Grams, Prior, System
+from rtcomp.diagnosis.numerics.regression import Prior, System
 from rtcomp.diagnosis.settings import BELIEF_SD
 from rtcomp.kernels import Floats
 
@@ -90,9 +90,8 @@ def within_belief(balance: ForceBalance, model: Fitted) -> Fitted:
         return model
     most, prior, columns = _most(balance, model), model.prior, model.system.columns
     prior = replace(prior, low=np.maximum(prior.low, -most), high=np.minimum(prior.high, most))
-    grams = Grams.of(columns, model.system.y, balance.block, balance.blocks)
-    c = grams.solve(~balance.reserved, prior, model.variance)
-    errors, rest = grams.errors(c, np.flatnonzero(~balance.reserved)), model.system.y - c @ columns
+    c = model.grams.solve(~balance.reserved, prior, model.variance)
+    errors, rest = model.grams.errors(c, np.flatnonzero(~balance.reserved)), model.system.y - c @ columns
     return replace(model, coefficients=c, weights=c[balance.friction], residual=rest, errors=errors)
 
 

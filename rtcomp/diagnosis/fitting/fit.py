@@ -31,6 +31,7 @@ from rtcomp.diagnosis.fitting.fitted import Fitted, left_out
 from rtcomp.diagnosis.fitting.free import Free, Term, changed, free_of
 from rtcomp.diagnosis.fitting.other_forms import other_beliefs, other_forms, variants
 from rtcomp.diagnosis.fitting.retuned import level_and_reach
+from rtcomp.diagnosis.fitting.solved import Posed, Solved
 from rtcomp.diagnosis.fitting.stage_of import stage_of
 from rtcomp.diagnosis.forces.balance import BASE, ForceBalance
 from rtcomp.diagnosis.forces.noise import Noise
@@ -214,28 +215,24 @@ class Fitter:
 
     def solve(
         self, terms: Sequence[Term], weights: Floats, variance: float, around: Floats | None = None
-    ) -> tuple[System, Prior, Grams, Floats, float]:
-        """Return the system of `terms`, its prior, statistics, coefficients and squared error in sample."""
-        system, prior, grams = self._made(terms, weights, around)
-        prior, c = (grams.solved if terms else grams.relaxed)(self.use, prior, variance)
-        return system, prior, grams, c, float(grams.errors(c, self.use).sum())
+    ) -> Solved:
+        """Return `terms` as they are with their coefficients, for friction of `weights` (N/m) at hand."""
+        return self._posed(terms, weights, around).solved(self.use, variance)
 
-    def _made(
-        self, terms: Sequence[Term], weights: Floats, around: Floats | None
-    ) -> tuple[System, Prior, Grams]:
+    def _posed(self, terms: Sequence[Term], weights: Floats, around: Floats | None = None) -> Posed:
         b = self.balance
         system = system_around(b, [t.entry for t in terms], weights, around)
         prior = prior_of(b, [*self._believed, *terms], system, offset=self.offset)
-        prior = as_held(b, prior) if terms else prior
-        return system, prior, Grams.of(system.columns, system.y, b.block, b.blocks)
+        grams = Grams.of(system.columns, system.y, b.block, b.blocks)
+        return Posed(system, grams, as_held(b, prior) if terms else prior, b.block, not terms)
 
     def quick(self, terms: Sequence[Term]) -> float:
         """Return the squared error in sample of `terms` as they are, with believed friction at work."""
         weights = self.balance.weights
         for _ in range(2 if by_weights(self.balance, [t.entry for t in terms]) else 1):
-            _, _, _, c, sse = self.solve(terms, weights, 1.0)
-            weights = c[self.balance.friction]
-        return sse
+            found = self.solve(terms, weights, 1.0)
+            weights = found.c[self.balance.friction]
+        return found.sse
 
     def fit(self, terms: Sequence[Term], start: Fitted | None = None, steps: int = STEPS) -> Fitted:
         """Fit a model from the values that its terms have; raise ConfigError where these are impossible."""
@@ -247,40 +244,41 @@ class Fitter:
         count = max(int(self.rows.sum()), 1)
         entries, made_for = [t.entry for t in current], weights
         # From the variance of noise upwards: one that another model leaves makes too much of the belief.
-        system, _, _, c, sse = self.solve(current, made_for, 1.0)
+        posed = self._posed(current, made_for)
+        at = posed.solved(self.use, 1.0)
         if by_weights(b, entries):
-            made_for, current = c[b.friction], self._sized(current, system, c)
-        system, prior, _, c, sse = self.solve(current, made_for, sse / count, c)
-        variance = sse / count
-        weights = c[b.friction]
+            made_for, current = at.c[b.friction], self._sized(current, at.system, at.c)
+            posed = self._posed(current, made_for, at.c)
+        at = posed.solved(self.use, at.sse / count)
+        variance = at.sse / count
+        weights = at.c[b.friction]
         free = free_of(current, b)
         damping, tangents = 1e-3, None
         for _ in range(steps if free else 0):
-            tangents = tangents_of(b, current, free, system, c, weights)
-            joint, wide = self.jointly(system, prior, tangents)
-            power = np.diag(joint.gram[self.use].sum(axis=0))[c.size :]
+            tangents = tangents_of(b, current, free, at.system, at.c, weights)
+            joint, wide = at.beside(tangents)
+            power = np.diag(joint.gram[self.use].sum(axis=0))[at.c.size :]
             improved = False
             for _ in range(4):
-                held = np.concatenate([wide.precision[: c.size], damping * power / max(variance, 1e-300)])
+                held = np.concatenate([wide.precision[: at.c.size], damping * power / max(variance, 1e-300)])
                 whole = joint.solve(self.use, Prior(wide.mean, held, wide.low, wide.high), variance)
-                if joint.errors(whole, self.use).sum() > (1.0 - SETTLED) * sse:
+                if joint.errors(whole, self.use).sum() > (1.0 - SETTLED) * at.sse:
                     break  # no step is expected to gain anything
-                trial = changed(self._sized(current, system, c), free, whole[c.size :])
+                trial = changed(self._sized(current, at.system, at.c), free, whole[at.c.size :])
                 try:
-                    found = self.solve(trial, weights, variance, c)
+                    found = self.solve(trial, weights, variance, at.c)
                 except ConfigError:
                     damping *= 10.0
                     continue
-                if found[-1] < sse:
+                if found.sse < at.sse:
                     improved = True
                     break
                 damping *= 10.0
             if not improved:
                 break
-            gained, tangents = 1.0 - found[-1] / sse, None
-            current, made_for = trial, weights
-            system, prior, _grams, c, sse = found
-            weights, variance = c[b.friction], sse / count
+            gained, tangents = 1.0 - found.sse / at.sse, None
+            current, made_for, at = trial, weights, found
+            weights, variance = at.c[b.friction], at.sse / count
             damping = max(0.1 * damping, 1e-6)
             free = free_of(current, b)
             if gained < SETTLED:
@@ -288,11 +286,11 @@ class Fitter:
         turns = TURNS if goes_by_whole(b, entries) else 0
         with suppress(ConfigError):  # where it grows beyond all bounds, it stays as it was
             while turns > 0 and not consistent(b, made_for, weights):
-                system, prior, _, c, sse = self.solve(current, weights, variance, c)
-                made_for, weights, turns, tangents = weights, c[b.friction], turns - 1, None
+                at = self.solve(current, weights, variance, at.c)
+                made_for, weights, turns, tangents = weights, at.c[b.friction], turns - 1, None
         if tangents is None:
-            tangents = tangents_of(b, current, free, system, c, weights)
-        done = self._finished(current, free, system, prior, c, tangents, sse, variance, weights)
+            tangents = tangents_of(b, current, free, at.system, at.c, weights)
+        done = self._finished(current, free, at, tangents, variance, weights)
         return self._as_it_is(done) if goes_by_whole(b, entries) else done
 
     def moved_by(self, model: Fitted, change: Floats) -> Fitted:
@@ -314,30 +312,25 @@ class Fitter:
         worse = max(float(np.sum(true[self.rows] ** 2)) / max(model.sse, 1e-300), 1.0)
         return replace(model, residual=true, sse=worse * model.sse, errors=worse * model.errors)
 
-    def jointly(self, system: System, prior: Prior, more: Floats) -> tuple[Grams, Prior]:
-        """Return statistics and prior of the columns of a system and of `more`, (q, n), together."""
-        columns = np.concatenate([system.columns, more])
-        return Grams.of(columns, system.y, self.block, self.blocks), prior.extended(more.shape[0])
+    def jointly(self, model: Fitted, more: Floats) -> tuple[Grams, Prior]:
+        """Return statistics and prior of the columns of a model and of `more`, (q, n), together."""
+        return Posed(model.system, model.grams, model.prior, self.block, not model.terms).beside(more)
 
     def _finished(
         self,
         terms: list[Term],
         free: list[Free],
-        system: System,
-        prior: Prior,
-        c: Floats,
+        at: Solved,
         tangents: Floats,
-        sse: float,
         variance: float,
         weights: Floats,
     ) -> Fitted:
-        joint, wide = self.jointly(system, prior, tangents)
-        whole = np.concatenate([c, np.zeros(len(free))])
+        joint, wide = at.beside(tangents)
+        whole = np.concatenate([at.c, np.zeros(len(free))])
         errors, without = left_out(joint, self.use, wide, variance, whole)
-        residual = system.y - c @ system.columns
         return Fitted(
-            tuple(self._sized(terms, system, c)), c, system, prior, residual, tangents, tuple(free), errors,
-            without, sse, variance, weights,
+            tuple(self._sized(terms, at.system, at.c)), at.c, at.system, at.grams, at.prior, at.residual,
+            tangents, tuple(free), errors, without, at.sse, variance, weights,
         )  # fmt: skip
 
     def _sized(self, terms: Sequence[Term], system: System, c: Floats) -> list[Term]:

@@ -23,6 +23,8 @@ class Fitted:
     coefficients: Floats
     """(p,): base, then sizes of entries that add a force, in the units of the columns."""
     system: System
+    grams: Grams
+    """Statistics of its columns."""
     prior: Prior
     residual: Floats
     """(n,), whitened, all rows."""

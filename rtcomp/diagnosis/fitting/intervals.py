@@ -93,7 +93,7 @@ def _shapes_held(fitter: Fitter, fitted: Fitted) -> Fitted:
 
 def _left_out(fitter: Fitter, fitted: Fitted, numbers: int = 0) -> Fitted:
     """Return the fit with its coefficients `without` each block computed again."""
-    grams, wide = fitter.jointly(fitted.system, fitted.prior, fitted.tangents)
+    grams, wide = fitter.jointly(fitted, fitted.tangents)
     found = left_out(grams, fitter.use, wide, fitted.variance, fitted.whole, numbers)
     return replace(fitted, without=found[1])
 

@@ -27,13 +27,17 @@ def law_of(fitter: Fitter, terms: Sequence[Term]) -> float:
     `terms` move with it, and the last may be of another form: what suits one law may hide another.
     """
     balance = fitter.balance
-    at_hand = fitter.fit(terms)
-    if balance.models.size or not at_hand.coefficients[balance.friction].any():
+    if balance.models.size:
         return balance.exponent
-    was = STOP if balance.exponent == STOP else SOLID
-    first = (fitter, at_hand) if balance.exponent == was else _by(fitter, was, terms)
-    other = STOP if was == SOLID else SOLID
-    second = _by(fitter, other, terms)
+    was, other = (STOP, SOLID) if balance.exponent == STOP else (SOLID, STOP)
+
+    def beside(exponent: float) -> tuple[Fitter, Fitted]:
+        at_hand = exponent == balance.exponent
+        return (fitter, fitter.fit(terms)) if at_hand else _by(fitter, exponent, terms)
+
+    first, second = shared(beside, (was, other))
+    if not first[1].coefficients[balance.friction].any():
+        return balance.exponent
     law, best = (other, second) if _less(first, second) else (was, first)
     return law if law == STOP else _settled(*best)
 

@@ -223,7 +223,7 @@ def _beside(fitter: Fitter, model: Fitted, forms: Floats) -> tuple[Floats, Grams
     A form is believed to differ by about the effect's own size.
     """
     more = np.concatenate([model.tangents, forms])
-    joint, prior = fitter.jointly(model.system, model.prior, more)
+    joint, prior = fitter.jointly(model, more)
     prior.precision[-forms.shape[0] :] = 1.0
     columns = np.concatenate([model.system.columns, more])
     return columns, joint, prior, joint.solve(fitter.use, prior, model.variance)

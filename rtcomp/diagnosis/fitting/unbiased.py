@@ -19,7 +19,7 @@ from rtcomp.kernels import Floats
 
 def numbers_of(fitter: Fitter, fitted: Fitted) -> Floats:
     """Return the coefficients and the changes of nonlinear parameters, (p + q,), one step on from a fit."""
-    joint, prior = fitter.jointly(fitted.system, fitted.prior, fitted.tangents)
+    joint, prior = fitter.jointly(fitted, fitted.tangents)
     return joint.solve(fitter.use, prior, fitted.variance)
 
 

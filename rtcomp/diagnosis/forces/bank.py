@@ -180,6 +180,14 @@ def _along(
                     run_chain(steps, p, s, w, first + i, first + i + 1)
                     here[i] = w[FRICTION]
             believed, its_level, its_stiffness = _believed(steps, p, s, w, first + SPEED_UNITS, own)
+            if parts == 2 and not whole and not summed and w[SOFTENS] == exponent == 0.0:
+                # Nothing asks what an element holds or changes it: it goes straight to the means.
+                stops, third = SPEED_UNITS + own, w[SCALE] / 3.0
+                if own > 0:
+                    here[SPEED_UNITS] = believed
+                _share_out(mean, here[:stops], last, k, j, parts)
+                _move_and_share(w[MOVED], w[REACH], third, reaches, deflection, mean, stops, k, j)
+                continue
             asked = 0.0
             if summed and w[SOFTENS] == exponent == 0.0:  # nobody asks what each element holds
                 moved, longer = w[MOVED], w[REACH]
@@ -288,14 +296,13 @@ def _share_out(mean: Floats, here: Floats, last: Floats, k: int, j: int, parts: 
     What comes after the last row is taken to be as before it.
     """
     end = mean.shape[0] - 1
-    if parts == 2:  # a parabola through both ends and the middle, weighed by the triangle
+    if parts == 2:
+        other = _other_row(k, j, end)
         for i in range(here.size):
             third = here[i] / 3.0
             mean[k, i] += third
-            if j == 1 and k > 0:
-                mean[k - 1, i] += third
-            if j == 2 and k == end:
-                mean[k, i] += third
+            if other >= 0:
+                mean[other, i] += third
         return
     passed = (j - 0.5) / parts
     for i in range(here.size):
@@ -306,3 +313,34 @@ def _share_out(mean: Floats, here: Floats, last: Floats, k: int, j: int, parts: 
             mean[k - 1, i] += (1.0 - passed) * share
         if k == end:
             mean[k, i] += (1.0 - passed) * share
+
+
+@compiled
+def _other_row(k: int, j: int, end: int) -> int:
+    """Return the row that half `j` of row `k` also counts in, -1 for none.
+
+    Forces go along a parabola through both ends and the middle of a row, weighed by the triangle.
+    """
+    if j == 1:
+        return k - 1
+    return k if k == end else -1
+
+
+@compiled
+def _move_and_share(
+    moved: float, longer: float, third: float, reaches: Floats, deflection: Floats, mean: Floats, stops: int,
+    k: int, j: int,
+) -> None:  # fmt: skip
+    """Move the stop elements on, and add half `j` of row `k` to their means, columns from `stops` on.
+
+    `third` is a third of the force that they hold for each metre (N/m).
+    """
+    row = mean[k, stops:]
+    for i in range(reaches.size):
+        deflection[i] = stretched(deflection[i], moved, reaches[i] * longer)
+        row[i] += third * deflection[i]
+    at = _other_row(k, j, mean.shape[0] - 1)
+    if at >= 0:
+        row = mean[at, stops:]
+        for i in range(reaches.size):
+            row[i] += third * deflection[i]

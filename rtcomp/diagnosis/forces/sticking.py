@@ -8,6 +8,7 @@ and what it does to friction is part of that of the residual.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -58,15 +59,27 @@ class RestWeights:
         first = np.concatenate([[0], np.flatnonzero(begins) + 1, [course.size]])
         return cls(trust, along(course, first), first)
 
+    @cached_property
+    def by_row(self) -> Floats:
+        """Factor of each row, (n,): its trust, and all that a stretch of a single row loses."""
+        alone = np.repeat(np.diff(self.first) == 1, np.diff(self.first))
+        return np.asarray(self.trust * np.where(alone, 1.0 - self.along**2, 1.0))
+
+    @cached_property
+    def longer(self) -> np.ndarray:
+        """First row of each stretch of several rows, and the one after its last, (S, 2)."""
+        both = np.column_stack([self.first[:-1], self.first[1:]])
+        return np.ascontiguousarray(both[np.diff(self.first) > 1])
+
     def weigh(self, rows: Floats) -> None:
         """Weigh filtered rows (p, n), in place."""
-        rows *= self.trust
-        _moved(rows, self.along, self.first, False)
+        rows *= self.by_row
+        _moved(rows, self.along, self.longer, False)
 
     def unweigh(self, rows: Floats) -> None:
         """Undo `weigh` on rows (p, n), in place."""
-        _moved(rows, self.along, self.first, True)
-        rows /= self.trust
+        _moved(rows, self.along, self.longer, True)
+        rows /= self.by_row
 
 
 def along(course: Floats, first: np.ndarray) -> Floats:
@@ -77,17 +90,18 @@ def along(course: Floats, first: np.ndarray) -> Floats:
 
 
 @compiled
-def _moved(rows: Floats, along: Floats, first: np.ndarray, back: bool) -> None:
-    """Apply ``I - along along^T`` to each stretch of rows, or `back` its inverse (Sherman, Morrison 1950)."""
+def _moved(rows: Floats, along: Floats, stretches: np.ndarray, back: bool) -> None:
+    """Apply ``I - along along^T`` to stretches of rows, or `back` its inverse (Sherman, Morrison 1950)."""
     for row in rows:
-        for one in range(first.size - 1):
+        for one in range(stretches.shape[0]):
+            first, last = stretches[one]
             part = power = 0.0
-            for k in range(first[one], first[one + 1]):
+            for k in range(first, last):
                 part += along[k] * row[k]
                 power += along[k] ** 2
             if part != 0.0:
                 size = part / (1.0 - power) if back else -part
-                for k in range(first[one], first[one + 1]):
+                for k in range(first, last):
                     row[k] += size * along[k]
 
 

@@ -78,6 +78,21 @@ class Grams:
         gram, cross, power = zip(*made, strict=True)
         return cls(np.array(gram), np.array(cross), np.array(power), np.diff(edges).astype(np.float64))
 
+    def extended(self, columns: Floats, more: Floats, y: Floats, block: np.ndarray) -> Grams:
+        """Return those of their columns (p, n) and `more`, (q, n), together; only what is new is computed."""
+        edges = np.searchsorted(block, np.arange(self.power.size + 1))
+
+        def products(ends: tuple[int, int]) -> tuple[Floats, Floats, Floats]:
+            part = more[:, slice(*ends)]
+            return part @ columns[:, slice(*ends)].T, part @ part.T, part @ y[slice(*ends)]
+
+        work = 2.0 * more.shape[0] * (columns.size + more.size)
+        made = shared(products, pairwise(edges.tolist()), operations=work)
+        between, own, cross = (np.array(each) for each in zip(*made, strict=True))
+        gram = np.concatenate([self.gram, between], axis=1)
+        gram = np.concatenate([gram, np.concatenate([between.transpose(0, 2, 1), own], axis=1)], axis=2)
+        return Grams(gram, np.concatenate([self.cross, cross], axis=1), self.power, self.rows)
+
     def solve(self, use: np.ndarray, prior: Prior, variance: float) -> Floats:
         """Return the coefficients (p,) fitted on the blocks where `use` (B,) is true.
 

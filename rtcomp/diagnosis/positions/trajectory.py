@@ -334,12 +334,13 @@ class Trajectory(Fitter):
         nowhere = slice(c.size, c.size)
         system = System(y, own, (nowhere,) * (len(self.balance.believed) + len(terms)))
         prior = self.belief.prior
-        joint, wide = self.jointly(system, prior, tangents)
+        grams = Grams.of(own, y, self.block, self.blocks)
+        joint, wide = grams.extended(own, tangents, y, self.block), prior.extended(tangents.shape[0])
         sse = float(np.sum(rest[self.rows] ** 2))
         variance = sse / max(int(self.rows.sum()), 1)
         whole = np.concatenate([c, np.zeros(len(free))])
         errors, without = left_out(joint, self.use, wide, variance, whole)
         return Fitted(
-            tuple(terms), c, system, prior, rest, tangents, tuple(free), errors, without, sse, variance,
-            np.zeros(0),
+            tuple(terms), c, system, grams, prior, rest, tangents, tuple(free), errors, without, sse,
+            variance, np.zeros(0),
         )  # fmt: skip

@@ -96,7 +96,7 @@ def search(
             late = step > 0 and clock.now() > ends
             at_hand = first if step == 0 else None
             known = found.beside if fitter.by_force else None
-            seen = _judged(fitter, beam[0], seed + step, say, at_hand, known, ends, late=late)
+            seen = _judged(fitter, beam[0], everything, seed + step, say, at_hand, known, ends, late=late)
             judged = sound(seen, beam[0], parents[id(beam[0])], found)
             if judged is None:
                 beam.pop(0)
@@ -228,8 +228,10 @@ def _resettled(
     law, best, left, found.elsewhere = fitter.balance.exponent, beam[0], math.inf, True
     others = [g for g in near if ent.names(g.entries) == ent.names(best.entries)]  # its other forms
     while best.sse < (1.0 - LEAST_GAIN) ** 2 * left and clock.now() < ends:
-        left = best.sse
-        settle(fitter, best.terms, ends)
+        once, left = left == math.inf, best.sse
+        settle(fitter, best.terms, ends, law=once)
+        if fitter.balance.exponent != law:
+            break
         best, *others = sorted(refitted(fitter, [best, *others]), key=lambda m: (m.at_bound, m.sse))
     found.baseline = fitter.fit([])
     if fitter.balance.exponent != law:
@@ -249,6 +251,7 @@ def _resettled(
 def _judged(
     fitter: Fitter,
     model: Fitted,
+    everything: float,
     seed: int,
     say: Say,
     first: Look | None,
@@ -260,8 +263,8 @@ def _judged(
     """Return the look beside a model with its null distribution, in a part of the time up to `ends`.
 
     `first` is that look, where it was taken before; `known` are candidates beside a smaller model. Where it
-    is too `late` for one, only what chance leaves is looked at. Where a belief leaves too little for any
-    effect to matter, a few replicates do, whatever they show.
+    is too `late` for one, only what chance leaves is looked at. Where a model leaves too little of
+    `everything` for any further effect to matter, a few replicates do, whatever they show.
     """
     names = ent.names(model.entries)
     what = f"beside {' and '.join(names)}" if names else "search"
@@ -271,7 +274,7 @@ def _judged(
     looked = clock.until(ends, LOOKED)
     seen = first or look(fitter, model, looked, known)
     say(0.5, what)
-    if not model.terms and exhausted(fitter, model, float(model.errors.sum())):
+    if exhausted(fitter, model, everything):
         ends = -math.inf
     return replace(seen, null=null_of(fitter, model, seen.screen, seen.gain, seed, looked, ends))
 
