@@ -21,7 +21,6 @@ from rtcomp.diagnosis.forces.noise import Noise
 from rtcomp.diagnosis.forces.sticking import untold
 from rtcomp.diagnosis.mismatch.locate import locate
 from rtcomp.diagnosis.mismatch.where import Compared, as_force
-from rtcomp.diagnosis.numerics.significance import Null
 from rtcomp.diagnosis.positions.hidden import MUCH, hides
 from rtcomp.diagnosis.positions.trajectory import Trajectory
 from rtcomp.diagnosis.recordings.data import load_data
@@ -30,11 +29,11 @@ from rtcomp.diagnosis.search.confidence import alternatives
 from rtcomp.diagnosis.search.replicates import null_of_belief
 from rtcomp.diagnosis.search.selection import LOOKED, Search, search
 from rtcomp.diagnosis.search.ways import Left, alike, doubted
-from rtcomp.diagnosis.settings import BUDGET, LEFT, LEVEL, TOLERANCE
+from rtcomp.diagnosis.settings import BUDGET, LEFT, LEVEL
 from rtcomp.diagnosis.verdict.answer import Rest, answer
+from rtcomp.diagnosis.verdict.as_believed import as_loud
 from rtcomp.diagnosis.verdict.validation import Reserved
 from rtcomp.errors import RtcompError
-from rtcomp.kernels import Floats
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
 
@@ -118,7 +117,7 @@ def _diagnosed(
     more = Rest.of(fitter, found).significant
     if hidden and (found.denied or more):
         fitter, found = _by_position(stage, fitter, found, finish, say, seed)
-    if fitter.by_force and more and (of_belief := _as_believed(stage, fitter, found, seed)) is not None:
+    if fitter.by_force and more and (of_belief := as_loud(fitter, stage, found, seed)) is not None:
         found.null, found.as_believed = of_belief, True
     say(0.0, "tell apart")
     sets = alternatives(fitter, found, ends - (1.0 - TELL_APART) * budget)
@@ -137,28 +136,6 @@ def _diagnosed(
     notes += [COMPILED.format(compiling)] if compiling > LONG else []
     notes += [f"not tried within {budget:g} s: {what}" for what in found.not_tried]
     return replace(done, notes=[*notes, *done.notes], not_tried=found.not_tried)
-
-
-def _as_believed(stage: Stage, fitter: Fitter, found: Search, seed: int) -> Null | None:
-    """Return what fits of the belief leave of its own recordings, where that is as much; else None.
-
-    Asked where a search found nothing. What rings or chatters beyond the bandwidth looks like damping to a
-    fit: a fitted stage that has it rings less, and what its replicates leave is no measure. The
-    unfitted belief must also agree with the recording, or have no larger error than on its own replicates.
-    """
-    if found.chosen.terms or found.null is None:
-        return None
-
-    def as_it_is(one: Fitter) -> Floats:
-        return np.asarray(np.bincount(one.block, one.left_by(stage) ** 2, one.blocks)[one.use])
-
-    gains, balance, unfitted = found.null.gains, fitter.balance, as_it_is(fitter)
-    if unfitted.sum() > TOLERANCE**2 * np.count_nonzero(fitter.rows):
-        null = null_of_belief(balance, stage, lambda data: as_it_is(fitter.on(data)), seed)
-        if null is None or null.p_of_error(unfitted) < LEVEL:
-            return None
-    null = null_of_belief(balance, stage, lambda data: fitter.on(data).fit([]).errors, seed, gains)
-    return null if null is not None and null.as_loud(found.chosen.errors, LEVEL) else None
 
 
 def _by_position(

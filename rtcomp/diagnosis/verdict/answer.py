@@ -25,6 +25,7 @@ from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named
 from rtcomp.diagnosis.search.confidence import Alternatives
 from rtcomp.diagnosis.search.selection import Search
 from rtcomp.diagnosis.settings import LEAST_GAIN, LEFT, LEVEL, TOLERANCE
+from rtcomp.diagnosis.verdict.as_believed import MATTERS, agrees
 from rtcomp.diagnosis.verdict.detectability import sights
 from rtcomp.diagnosis.verdict.experiment import next_experiment
 from rtcomp.diagnosis.verdict.one_cause import LENGTH, Cause, fixed_units, force_constant, one_cause
@@ -91,16 +92,20 @@ def answer(
     before, after = fitter.force(base), fitter.force(final)
     part = rest.share if named else _left_of_belief(fitter, found, believed, base)
     slight = not named and part <= LEFT
-    if rest.significant or (chosen.terms and not named):
+
+    def unexplained(share: float) -> Named:
         left = locate(view, after, None, seed, believed.axis)
-        named.append(
-            Named(UNEXPLAINED, 1.0, {}, min(part, 1.0) if named or slight else 1.0, curve=left_over(left))
-        )
+        return Named(UNEXPLAINED, 1.0, {}, share, curve=left_over(left))
+
+    if rest.significant or (chosen.terms and not named):
+        named.append(unexplained(min(part, 1.0) if named or slight else 1.0))
     stages, moved = _stages(believed, fitter, base, final, cause)
     moved = [] if found.as_believed else moved
     if cause is not None and cause.unit == LENGTH:
         named.append(_other_scale(fitter, believed, stages["retuned"], cause))
     verdict, matters = _verdict(named, fitter, believed, stages["retuned"], moved, slight=slight)
+    if verdict == "consistent" and fitter.by_force and not agrees(fitter, believed, seed):
+        verdict, named = "unexplained", [unexplained(1.0)]
     if not matters:
         stages["after"] = stages["retuned"] = believed
     errors = reserved.judge({"before": believed, **stages})
@@ -244,8 +249,7 @@ def _left_of_belief(fitter: Fitter, found: Search, believed: Stage, base: Fitted
 def _matters(fitter: Fitter, believed: Stage, retuned: Stage) -> bool:
     """Tell whether other numbers of the belief bring down an error that is not small already."""
     relative = float(np.sqrt(np.mean(fitter.left_by(believed)[fitter.rows] ** 2)))
-    least = -2.0 * math.log1p(-LEAST_GAIN)
-    return relative > TOLERANCE and float(_gains(fitter, believed, retuned).mean()) > least
+    return relative > TOLERANCE and float(_gains(fitter, believed, retuned).mean()) > MATTERS
 
 
 def _gains(fitter: Fitter, before: Stage, after: Stage) -> Floats:

@@ -13,7 +13,9 @@ from rtcomp.diagnosis.forces.replicate import left_by
 from rtcomp.diagnosis.positions.trajectory import Trajectory
 from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.search.replicates import null_of_belief
+from rtcomp.diagnosis.search.selection import Search
 from rtcomp.diagnosis.settings import LEVEL
+from rtcomp.diagnosis.verdict.as_believed import agrees, as_loud
 from rtcomp.stage.stage import Stage
 
 
@@ -57,3 +59,5 @@ def test_what_rings_beyond_the_bandwidth_is_no_missing_physics(hidden: list[dict
     assert null is not None
     assert fitter.on(of_fit).fit([]).errors.sum() < 0.75 * base.errors.sum()
     assert null.as_loud(base.errors, LEVEL) == (not hidden)
+    assert (as_loud(fitter, belief, Search(base, base, null), 3) is not None) == (not hidden)
+    assert agrees(fitter, belief, 3) == (not hidden)
