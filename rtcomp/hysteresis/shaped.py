@@ -34,10 +34,10 @@ from typing import Any
 import numpy as np
 
 from rtcomp.errors import ConfigError, nearest
+from rtcomp.grain import beyond_grain
 from rtcomp.hysteresis.basis import Basis, checked_keys, register_basis
 from rtcomp.hysteresis.interval import AMOUNTS, INPUT, STARTED, IntervalBasis, advance
 from rtcomp.hysteresis.madelung import FORMS, LEANS, STATES, lean
-from rtcomp.hysteresis.skew import beyond_grain
 from rtcomp.hysteresis.smoothness import Term, correlation
 from rtcomp.kernels import Floats, basis_kernel, compiled
 
@@ -89,7 +89,7 @@ def shaped_interval_operator(p: Floats, s: Floats, x: Floats, u: float) -> None:
     s[last] = u
     if step == 0.0:
         return
-    step += p[at + SKEW] * beyond_grain(s, last + 1, step, p[at + GRAIN])
+    step += p[at + SKEW] * abs(beyond_grain(s, last + 1, step, p[at + GRAIN]))
     s[INPUT] = 0.0  # the operator sees displacements, so that a skewed one accumulates nothing
     advance(p, s, x, step)
     z = 0.0

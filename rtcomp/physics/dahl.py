@@ -8,14 +8,24 @@ from rtcomp.kernels import Floats, effect_kernel
 from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Effect, Parameter, Place
 from rtcomp.physics.softening import softened
-from rtcomp.physics.wires import FRICTION, GRIP, GRIP_LEVEL, GRIP_STIFFNESS, MOVED, REACH, SCALE, SOFTENS
-from rtcomp.physics.yielding import neared
+from rtcomp.physics.wires import (
+    FRICTION,
+    GRAIN,
+    GRIP,
+    GRIP_LEVEL,
+    GRIP_STIFFNESS,
+    MOVED,
+    REACH,
+    SCALE,
+    SOFTENS,
+)
+from rtcomp.physics.yielding import neared, without_noise
 
 
 @effect_kernel
 def dahl(p: Floats, s: Floats, w: Floats) -> None:
-    """p: stiffness, coulomb, exponent i; s: force (N)."""
-    moved = w[MOVED]
+    """p: stiffness, coulomb, exponent i; s: force (N), place within the grain and direction."""
+    moved = without_noise(s, 1, w[MOVED], w[GRAIN])
     if moved != 0.0:
         level = p[1] * w[REACH]
         direction = math.copysign(1.0, moved)
@@ -39,7 +49,7 @@ class Dahl(Effect):
         Parameter("exponent", "1", 0.0, 10.0, "shape: 0 brittle, 1 exponential, more is ductile", 1.0),
     )
     kernel = dahl
-    states = 1
+    states = 3
     says = "friction whose slope against displacement falls as it nears its level; the same at every speed"
     equation = "dF/dx = k |1 - F/Fc sgn(v)|^i sgn(1 - F/Fc sgn(v))"
     source = "Dahl (1968), A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1"

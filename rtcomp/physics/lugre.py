@@ -11,6 +11,7 @@ from rtcomp.physics.level import LEVEL, VISCOUS, speed_midway, stribeck_level, v
 from rtcomp.physics.softening import softened
 from rtcomp.physics.wires import (
     FRICTION,
+    GRAIN,
     GRIP,
     GRIP_LEVEL,
     GRIP_STIFFNESS,
@@ -21,13 +22,17 @@ from rtcomp.physics.wires import (
     SOFTENS,
     VELOCITY,
 )  # fmt: skip
+from rtcomp.physics.yielding import without_noise
 
 
 @effect_kernel
 def lugre(p: Floats, s: Floats, w: Floats) -> None:
-    """p: stiffness, damping, coulomb, static, Stribeck velocity, exponent, viscous; s: deflection z (m)."""
+    """p: stiffness, damping, coulomb, static, Stribeck velocity, exponent, viscous.
+
+    s: deflection z (m), place within the grain and direction.
+    """
     v = w[VELOCITY]
-    moved = w[MOVED]
+    moved = without_noise(s, 1, w[MOVED], w[GRAIN])
     level = stribeck_level(p[2], p[3], p[4], p[5], speed_midway(w))
     settled = level * w[REACH] / p[0]
     # The solution at constant speed depends on the displacement only: exact for a step of any size.
@@ -52,7 +57,7 @@ class LuGre(Effect):
         VISCOUS,
     )
     kernel = lugre
-    states = 1
+    states = 3
     says = (
         "bristles that bend and give way: presliding, Stribeck curve and frictional lag from a single state"
     )

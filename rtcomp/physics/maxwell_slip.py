@@ -9,8 +9,18 @@ from rtcomp.physics.catalogue import register
 from rtcomp.physics.effect import Parameter, Place
 from rtcomp.physics.lists import ListEffect
 from rtcomp.physics.softening import softened
-from rtcomp.physics.wires import FRICTION, GRIP, GRIP_LEVEL, GRIP_STIFFNESS, MOVED, REACH, SCALE, SOFTENS
-from rtcomp.physics.yielding import stretched, yielded
+from rtcomp.physics.wires import (
+    FRICTION,
+    GRAIN,
+    GRIP,
+    GRIP_LEVEL,
+    GRIP_STIFFNESS,
+    MOVED,
+    REACH,
+    SCALE,
+    SOFTENS,
+)
+from rtcomp.physics.yielding import stretched, without_noise, yielded
 
 STIFFNESS = Parameter("stiffness", "N/m", -1e12, 1e12, "spring of the element", physical_low=0.0)
 EXPONENT = Parameter("exponent", "1", 0.0, 10.0, "of Dahl's law by which elements yield; 0 is a stop", 0.0)
@@ -29,15 +39,18 @@ def _held(p: Floats, s: Floats, count: int, moved: float, longer: float) -> floa
 
 @effect_kernel
 def maxwell_slip(p: Floats, s: Floats, w: Floats) -> None:
-    """p: count, stiffnesses, reaches, level, whole stiffness, exponent; s: deflection (m) of each element."""
+    """p: count, stiffnesses, reaches, level, whole stiffness, exponent.
+
+    s: deflection (m) of each element, place within the grain and direction (`without_noise`).
+    """
     count, longer, softening = int(p[0]), w[REACH], w[SOFTENS]
     exponent = p[3 + 2 * count]
     if exponent == 0.0:
         force = _held(p, s, count, w[MOVED], longer)
     else:
-        force = 0.0
+        force, moved = 0.0, without_noise(s, count, w[MOVED], w[GRAIN])
         for i in range(count):
-            s[i] = yielded(s[i], w[MOVED], p[1 + count + i] * longer, exponent)
+            s[i] = yielded(s[i], moved, p[1 + count + i] * longer, exponent)
             force += p[1 + i] * s[i]
     if softening != 0.0:
         force = 0.0
@@ -74,8 +87,8 @@ class MaxwellSlip(ListEffect):
         return np.array([len(self.elements), *stiffness, *reach, self.level, sum(stiffness), self.exponent])
 
     def initial_state(self) -> Floats:
-        """Return the elements' deflections, all relaxed."""
-        return np.zeros(len(self.elements))
+        """Return the elements' deflections, all relaxed, and no motion within the grain."""
+        return np.zeros(len(self.elements) + 2)
 
     def stiffness(self) -> float:
         """Return the stiffness just after a reversal out of sliding (N/m)."""

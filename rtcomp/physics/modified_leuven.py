@@ -18,6 +18,7 @@ from rtcomp.physics.lists import ListEffect
 from rtcomp.physics.softening import softened
 from rtcomp.physics.wires import (
     FRICTION,
+    GRAIN,
     GRIP,
     GRIP_LEVEL,
     GRIP_STIFFNESS,
@@ -28,6 +29,7 @@ from rtcomp.physics.wires import (
     SOFTENS,
     VELOCITY,
 )  # fmt: skip
+from rtcomp.physics.yielding import without_noise
 
 DAMPING = Parameter("damping", "N s/m", 0.0, 1e8, "damping sigma_1 of the presliding state", 0.0)
 
@@ -37,8 +39,9 @@ def modified_leuven(p: Floats, s: Floats, w: Floats) -> None:
     """p: coulomb, static, Stribeck velocity, exponent, sharpness, damping, viscous, count, then elements,
     then the whole stiffness.
 
-    Elements are stiffness and reach each; s: deflection (m) of each. Within a step the motion is cut where
-    the force would change by more than a tenth of the level, so a long step is as right as many short ones.
+    Elements are stiffness and reach each; s: deflection (m) of each, place within the grain and direction.
+    Within a step the motion is cut where the force would change by more than a tenth of the level, so a long
+    step is as right as many short ones.
     """
     v = w[VELOCITY]
     n = p[4]
@@ -47,8 +50,8 @@ def modified_leuven(p: Floats, s: Floats, w: Floats) -> None:
     nominal = stribeck_level(p[0], p[1], p[2], p[3], speed_midway(w))
     level = nominal * widen
     cut = longest(n)
-    left = abs(w[MOVED])
-    direction = math.copysign(1.0, w[MOVED])
+    moved = without_noise(s, count, w[MOVED], w[GRAIN])
+    left, direction = abs(moved), math.copysign(1.0, moved)
     steps = 0
     while left > 0.0:
         along = 0.0
@@ -136,8 +139,8 @@ class ModifiedLeuven(ListEffect):
         return np.append(super().vector(), sum(k for k, _ in self.elements))
 
     def initial_state(self) -> Floats:
-        """Return the elements' deflections, all relaxed."""
-        return np.zeros(len(self.elements))
+        """Return the elements' deflections, all relaxed, and no motion within the grain."""
+        return np.zeros(len(self.elements) + 2)
 
     def stiffness(self) -> float:
         """Return twice the bank's stiffness, reached just after a reversal out of sliding (N/m)."""

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import math
 
-from rtcomp.kernels import compiled
+from rtcomp.grain import beyond_grain
+from rtcomp.kernels import Floats, compiled
 
+TURN = 2.0
+"""Grains within which what yields as a solid sees no turn: of white noise one of a few hundred rows is beyond
+(three deviations), and each turn makes it forget a part of its force."""
 LEAST_GAP = 1e-200
 """A gap that counts as none: its powers would leave the range of floats."""
 
@@ -44,3 +48,12 @@ def yielded(deflection: float, moved: float, reach: float, exponent: float) -> f
         return deflection
     way = math.copysign(1.0, moved)
     return way * reach * (1.0 - neared(1.0 - way * deflection / reach, abs(moved) / reach, exponent))
+
+
+@compiled
+def without_noise(s: Floats, at: int, moved: float, grain: float) -> float:
+    """Return how far (m) something that forgets in every small loop was `moved`, noise of a reading left out.
+
+    s[at]: place within the grain (m); s[at + 1]: direction of motion beyond it (`beyond_grain`).
+    """
+    return beyond_grain(s, at, moved, TURN * grain)

@@ -83,6 +83,19 @@ def test_the_balance_is_that_of_the_simulation(entry: type[physics.Effect]) -> N
         assert without > 2 * with_it
 
 
+@pytest.mark.parametrize("name", sorted(MODELS))
+def test_noise_of_the_reading_does_not_wear_friction_down(name: str) -> None:
+    """A solid forgets a part of its force in every small loop, and noise is nothing but small loops."""
+    friction = {"model": name, **physics.entry(name).example}
+    if name == "maxwell-slip":
+        friction["exponent"] = 1.0
+    stage = PLAIN.with_changes(stage={"friction": friction}, sensor={"noise": 1.5e-8, "resolution": 1e-8})
+    t, position, voltage = recorded(stage)
+    error = force_balance(stage, t, position, voltage).relative_error
+    print(name, error)
+    assert error < 0.05
+
+
 def test_only_sensors_that_cannot_be_undone_are_left_out() -> None:
     for name in UNSEEN:
         entry = physics.entry(name)

@@ -34,7 +34,7 @@ from rtcomp.physics.wires import (
     SCALE,
     SOFTENS,
 )
-from rtcomp.physics.yielding import stretched, yielded
+from rtcomp.physics.yielding import stretched, without_noise, yielded
 from rtcomp.stage.balance import along_row, around_rows, parts_of
 from rtcomp.stage.stage import Stage
 
@@ -113,11 +113,12 @@ def units_along(
 
 
 @compiled
-def deflections(position: Floats, reaches: Floats, exponent: float) -> Floats:
-    """Return the deflections (m, (N,)) of elements after a motion (m, (K,)), from nothing."""
-    found = np.zeros(reaches.size)
+def deflections(position: Floats, reaches: Floats, exponent: float, grain: float) -> Floats:
+    """Return the deflections (m, (N,)) of elements after a motion (m, (K,)) of a `grain`, from nothing."""
+    found, within = np.zeros(reaches.size), np.zeros(2)
     for k in range(1, position.size):
         moved = position[k] - position[k - 1]
+        moved = moved if exponent == 0.0 else without_noise(within, 0, moved, grain)
         for i in range(reaches.size):
             found[i] = yielded(found[i], moved, reaches[i], exponent)
     return found
@@ -168,6 +169,7 @@ def _along(
         stiffness += stiffer * weights[i]
     level_asked = _total(times, reaches) if summed else 0.0
     here, last, held = np.zeros(mean.shape[1]), np.zeros(mean.shape[1]), np.empty(count)
+    within = np.zeros(2)
     for k in range(motion.shape[0]):
         for j in range(1, parts + 1):
             along_row(w, motion, k, float(j), parts)
@@ -194,7 +196,8 @@ def _along(
                 total, asked = _stretched_sums(moved, longer, reaches, deflection, weights, times)
                 total, asked = total * w[SCALE], asked * w[SCALE]
             else:
-                _stretch(w[MOVED], w[REACH], w[SCALE], w[SOFTENS], reaches, exponent, deflection, held)
+                moved = w[MOVED] if exponent == 0.0 else without_noise(within, 0, w[MOVED], w[GRAIN])
+                _stretch(moved, w[REACH], w[SCALE], w[SOFTENS], reaches, exponent, deflection, held)
                 total = _total(weights, held) if whole else 0.0
                 asked = _total(times, held) if summed else 0.0
             grown = 1.0

@@ -46,7 +46,9 @@ def replicate(stage: Stage, data: Data, motion: list[Floats], noise: float, seed
     low, high = data.stroke
     counts = stage.sensor.resolution
     recorded = data.as_recorded()
-    rest = max(math.sqrt(max(noise**2 - counts**2 / 12.0, 0.0)), DITHER * counts)
+    beside = math.sqrt(max(noise**2 - counts**2 / 12.0, 0.0))  # counts, which are not white at rest
+    stated = min(stage.sensor.noise, noise)
+    rest = max(stated if stage.sensor.noise > 0.0 else beside, DITHER * counts)
     stage = stage.with_changes(sensor={"noise": rest, "resolution": counts})
     finer = _finer(data)
     along = zip(recorded.segments, motion, strict=True)

@@ -312,7 +312,7 @@ class Signals:
             return [
                 np.zeros(self.reaches.size)
                 if way is None
-                else deflections(way[1], self.reaches, self.exponent)
+                else deflections(way[1], self.reaches, self.exponent, self.grain)
             ]
 
         key = ("start", float(segment.time[0]), segment.time.size, key_of(sensors))

@@ -40,3 +40,14 @@ def test_a_stage_faster_than_any_row_tells_has_no_replicate_and_is_far_off() -> 
     assert left_by(quick, balance) is None
     low, high = balance.data.stroke
     assert np.abs(Windows.of(balance).off(quick)) == pytest.approx(high - low)
+
+
+def test_a_reading_has_the_noise_that_the_sensor_states_beside_its_counts() -> None:
+    """At rest counts are no white noise, and a recording has less of it than a twelfth of their square."""
+    axis = stage().with_changes(sensor={"noise": 1.5e-8, "resolution": 5e-8})
+    data = load_data([run(axis, there_and_back(4.0))])
+    segment = data.segments[0]
+    made = replicate(axis, data, [segment.position], noise=1.6e-8, seed=3)
+    assert made is not None
+    jitter = [np.std(np.diff(one.segments[0].position, 3)) for one in (made, data)]
+    assert jitter[0] == pytest.approx(jitter[1], rel=0.1)
