@@ -26,12 +26,17 @@ Kind = TypeVar("Kind")
 def grow(
     fitter: Fitter, model: Fitted, made: Sequence[Candidate], screened: Sequence[Screened], ends: float
 ) -> list[Fitted]:
-    """Return the model with each of the best candidates, fitted in full."""
+    """Return the model with each of the best candidates, fitted in full: each effect once, then other forms.
+
+    A fit that goes on in another form finds it (`in_better_form`), but not another effect.
+    """
     families: dict[str, list[Start]] = {}
     for candidate, some in zip(made, screened, strict=True):
         families.setdefault(candidate.family, []).append((candidate, some))
     starts = [likeliest(each, lambda s: s[1].gain, lambda s: s[1].left) for each in families.values()]
     order = likeliest(starts, lambda each: each[0][1].gain, lambda each: min(s.left for _, s in each))
+    first = {each[0][0].name: each[0][0].family for each in reversed(order)}
+    order.sort(key=lambda each: first[each[0][0].name] != each[0][0].family)
     terms = fitter.rough(model, [[started(c, s.sizes) for c, s in each] for each in order], FULL_FITS, ends)
     # First order is no guide to what is behind a play: its own motion is followed from place to place.
     behind = {c.name: c.term for c in made if fitter.by_force and ent.kind_of(c.term.entry).behind}

@@ -27,6 +27,8 @@ POINTS = 5
 """Start values of a nonlinear parameter."""
 PEAKS = 3
 """Peaks taken of a periodogram."""
+ALIKE = 0.02
+"""Difference of the logarithm of periods that are found for one wave."""
 APART = 2.0
 """Ratio of neighbouring voltages at most: a fit finds its way from one to the next."""
 
@@ -139,7 +141,11 @@ def _listed(values: Floats) -> list[float]:
 
 
 def _periods(balance: ForceBalance, force: Floats, residual: Floats) -> Floats:
-    """Return periods (m) of waves along the position, in the residual as force and as displacement."""
+    """Return periods (m) of waves along the position, in the residual as force and as displacement.
+
+    A wave of the force, of friction, of the drive, and of the reading, whose acceleration goes by the square
+    of the speed. Of periods that are alike, that which explains most: the others are off by their weight.
+    """
     paths = balance.paths()
     x = balance.plain([p.x for p in paths])
     v = balance.plain([p.v for p in paths])
@@ -147,18 +153,22 @@ def _periods(balance: ForceBalance, force: Floats, residual: Floats) -> Floats:
     span = float(np.ptp(x))
     step = float(np.median(np.abs(np.diff(x)))) or span / 1000.0
     most = float(np.clip(span / max(2.0 * step, 4.0 * balance.grain, 1e-4 * span), 4.0, 1500.0))
-    found: list[float] = []
+    found: list[tuple[float, float]] = []
     for weight, of in (
         (np.ones_like(x), force),
         (np.sign(v), force),
         (u, force),
+        (v**2, force),
         (np.ones_like(x), residual),
     ):
         n, power = periodogram(x, span, weight, of, most)
-        some = n >= 0.8
-        found += [span / k for k in highest(n[some], power[some], PEAKS, 0.05)]
-    periods = np.sort(np.array(found))
-    return np.asarray(periods[np.concatenate([[True], np.diff(np.log(periods)) > 0.02])])
+        n, share = n[n >= 0.8], power[n >= 0.8] / max(float(of @ of), 1e-300)
+        found += [(float(share[n == k][0]), span / k) for k in highest(n, share, PEAKS, 0.05)]
+    periods: list[float] = []
+    for _, period in sorted(found, reverse=True):
+        if all(abs(np.log(period / other)) > ALIKE for other in periods):
+            periods.append(period)
+    return np.sort(periods)
 
 
 def tones_of(balance: ForceBalance, residual: Floats) -> Floats:

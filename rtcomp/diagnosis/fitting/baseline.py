@@ -19,6 +19,7 @@ from rtcomp.diagnosis.fitting.law import law_of
 from rtcomp.diagnosis.fitting.replicated import replicated
 from rtcomp.diagnosis.fitting.timing import put_in_step
 from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.forces.reaches import further
 from rtcomp.diagnosis.forces.signals import BASE, FURTHEST
 from rtcomp.diagnosis.settings import LEAST_GAIN
 from rtcomp.kernels import Floats
@@ -39,7 +40,7 @@ EARLIER, CLOSE = 4.0, 1.4
 """Times earlier than an axis seems to, that its friction may yield behind a play; ratio of units there, and
 of the gaps that are looked through: a play shows within a fifth of its gap."""
 HARDLY = 0.02
-"""Part of the friction level that the shortest units hold together, which are not counted for that."""
+"""Part of the friction level that the shortest units hold together, or the longest, which are not counted."""
 SLIGHT = 1e-3
 """Part of the friction level below which a unit is not needed."""
 
@@ -195,6 +196,26 @@ def _put_grid(fitter: Fitter, terms: Sequence[Term]) -> None:
     skeleton = np.concatenate([coarse[::2][(coarse[::2] < low) | (coarse[::2] > high)], close])
     far = np.array([not kept.size or np.min(np.abs(np.log(kept / r))) > step * FINER for r in skeleton])
     balance.put(np.concatenate([kept, skeleton[far]]), step * FINER)
+
+
+def yielding_later(fitter: Fitter, model: Fitted) -> Fitter | None:
+    """Return the objective on a grid that goes on to where nothing yields, settled on the model's terms.
+
+    None where a model has hardly any friction in the last step of the grid. Not the first choice: what yields
+    late is much like a spring.
+    """
+    balance = fitter.balance
+    if not fitter.by_force:
+        return None
+    force, low, high = model.coefficients[balance.friction] * balance.reaches, *balance.data.stroke
+    longer = further(balance.coarse, high - low)
+    last = force[balance.reaches > balance.coarse[-2]].sum()
+    if longer.size == balance.coarse.size or last <= HARDLY * max(float(force.sum()), 1e-300):
+        return None
+    other = fitter.on(balance.data)
+    other.balance.coarse = longer
+    _put_grid(other, model.terms)
+    return other
 
 
 def yields(balance: ForceBalance, fitted: Fitted) -> tuple[float, float]:

@@ -22,6 +22,8 @@ SMALL = 0.05
 """Size of a parameter, over that of the drive's force or of 1, that is taken to be first order."""
 SWINGS = 2.0
 """Times the motion's bandwidth up to which a resonance may lie: at half of it, it swings a third more."""
+FASTEST = 2.0
+"""Times the fastest motion up to which a speed may lie: what changes beyond is a constant in this motion."""
 AT_BOUND = 1e-3
 """Part of a number, or of a short range, by which it may be away from its bound and still be at it."""
 
@@ -115,6 +117,8 @@ def _free_of(terms: Sequence[Term], balance: ForceBalance, *, sizes: bool) -> li
                 shown = min(SWINGS * balance.noise.bandwidth, 0.5 * balance.data.rate)
                 most = min(p.high, shown if p.default is None else balance.data.rate)
                 step = min(0.02, 0.01 / (value * balance.data.last)) if waves else step
+            elif p.unit == "m/s" and p.name not in kind.linear:
+                most = min(most, FASTEST * _fastest(balance))
             elif p.unit == "s" and p.name not in (kind.neutral or {}):
                 # A scale shorter than a row is no finding; a size may be as small as it is.
                 least = max(p.lowest, min(balance.data.period, value))
@@ -123,6 +127,11 @@ def _free_of(terms: Sequence[Term], balance: ForceBalance, *, sizes: bool) -> li
             told = p.unit != "Hz" or p.default is None
             found.append(Free(i, p.name, least, most, log, step, told))
     return found
+
+
+def _fastest(balance: ForceBalance) -> float:
+    """Return the largest speed (m/s) of the recorded motion."""
+    return max(float(np.abs(path.v).max()) for path in balance.paths())
 
 
 def changed(terms: Sequence[Term], free: Sequence[Free], change: Floats) -> list[Term]:

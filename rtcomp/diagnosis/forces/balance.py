@@ -88,14 +88,14 @@ class ForceBalance(Signals):
         Or of another length, with the `block` of each compared row, (n,), of which none is reserved.
         """
         other = ForceBalance(self.stage, data, self.noise)
-        other.reaches, other.step, other.grain = self.reaches, self.step, self.grain
+        other.reaches, other.coarse, other.step = self.reaches, self.coarse, self.step
         other._whitening, other.blocks, other.block = self._whitening, self.blocks, self.block
-        other._reserved = self._reserved
+        other._reserved, other.let_go = self._reserved, self.let_go
         if block is not None:
             other.blocks, other.block = int(block[-1]) + 1, block
             other._reserved = np.zeros(other.blocks, dtype=np.bool_)
         other.believed_speed, other.speed_room = self.believed_speed, self.speed_room
-        other.level, other.exponent, other.let_go = self.level, self.exponent, self.let_go
+        other.grain, other.level, other.exponent = self.grain, self.level, self.exponent
         other._cache = Cache(KEPT_ONCE)
         if self._whitening is not None:
             other._rest = RestWeights.of(other)

@@ -42,6 +42,13 @@ def grid(stage: Stage, data: Data, grain: float) -> Floats:
     return np.geomspace(min(shortest, 0.5 * longest), longest, GRID)
 
 
+def further(reaches: Floats, stroke: float) -> Floats:
+    """Return a grid (m) that goes on in the same steps, up to where nothing yields on such a stroke (m)."""
+    step = np.log(reaches[1] / reaches[0])
+    more = np.arange(np.log(reaches[-1]) + step, np.log(YIELDS * stroke), step)
+    return np.append(reaches, np.exp(more))
+
+
 def joined(own: Floats, grid: Floats, step: float) -> Floats:
     """Return believed yield displacements (m) and those of a grid that are not close to one of them."""
     if not own.size:

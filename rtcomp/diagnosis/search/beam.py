@@ -87,17 +87,17 @@ def beats(fitter: Fitter, model: Fitted, chosen: Fitted, null: Null, everything:
 def shown_by_more_than_fitting(
     beam: Sequence[Fitted], chosen: Fitted, null: Null, ends: float = math.inf
 ) -> list[Fitted]:
-    """Return the beam without the models at its head whose last effect gains as much on replicates.
+    """Return the beam without the models at its head whose new effects gain as much on replicates.
 
-    It is fitted there too: what grows far from its start gains little to first order. Not asked after the
-    time `ends` (clock.now).
+    They are fitted there too: what grows far from its start gains little to first order, and two together
+    more than one. Not asked after the time `ends` (clock.now).
     """
     for i, model in enumerate(beam):
         gain = log_gain(chosen.errors, model.errors)
-        larger = len(model.terms) == len(chosen.terms) + 1
+        larger = len(model.terms) > len(chosen.terms)
         if null.in_full is None or not larger or clock.now() > ends:
             return list(beam[i:])
-        more = null.in_full(model.terms[-1]).mean() - null.gains.mean()
+        more = null.in_full(model.terms[len(chosen.terms) :]).mean() - null.gains.mean()
         if null.p_value(gain - max(float(more), 0.0)) < LEVEL:
             return list(beam[i:])
     return []

@@ -149,8 +149,8 @@ def _of_model(
     return replace(null, in_full=partial(_gains_of, fitter, fitted, stage, 1000 * seed))
 
 
-def _gains_of(fitter: Fitter, fitted: Fitted, stage: Stage, seed: int, term: Term) -> Floats:
-    """Return what a `term`, as it was found, gains in short fits of a few replicates of a stage, (r,)."""
+def _gains_of(fitter: Fitter, fitted: Fitted, stage: Stage, seed: int, more: Sequence[Term]) -> Floats:
+    """Return what `more` terms, as they were found, gain in short fits of a few replicates, (r,)."""
 
     def one(number: int) -> float:
         data = left_by(stage, fitter.balance, number)
@@ -159,7 +159,7 @@ def _gains_of(fitter: Fitter, fitted: Fitted, stage: Stage, seed: int, term: Ter
         other = fitter.on(data)
         again = other.fit(list(fitted.terms), fitted, steps=0)
         try:
-            larger = other.fit([*again.terms, term], again, starting.FEW)
+            larger = other.fit([*again.terms, *more], again, starting.FEW)
         except (ConfigError, np.linalg.LinAlgError):
             return 0.0
         return log_gain(again.errors, larger.errors)

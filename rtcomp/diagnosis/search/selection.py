@@ -10,7 +10,7 @@ from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.candidates.effects import Candidate
 from rtcomp.diagnosis.candidates.screening import Look, Screen, Screened, look
-from rtcomp.diagnosis.fitting.baseline import settle
+from rtcomp.diagnosis.fitting.baseline import settle, yielding_later
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
@@ -208,6 +208,14 @@ def _settled_on_chosen(fitter: Fitter, found: Search) -> None:
     found.alternatives = refitted(fitter, found.alternatives)
 
 
+def _begun_again(fitter: Fitter, found: Search, parents: dict[int, float], ends: float) -> list[Fitted]:
+    """Return the belief, fitted with the friction that it is to have from now on."""
+    settle(fitter, (), ends, law=False)
+    found.baseline = fitter.fit([])
+    parents[id(found.baseline)], found.beside, found.elsewhere = math.inf, None, False
+    return [found.baseline]
+
+
 def _resettled(
     fitter: Fitter,
     found: Search,
@@ -221,8 +229,13 @@ def _resettled(
 
     Of the models that were `grown`, those that come near the best. Its own numbers and form were bent as
     well: both are settled in turn, as long as the error falls. What only made up for that is left out again.
-    Where friction yields by another law than before, only the belief is returned: all begins beside that.
+    Where friction yields by another law than before, only the belief is returned: all begins beside that. So
+    it does where friction that yields later explains more than the last effect.
     """
+    later = yielding_later(fitter, found.chosen)
+    if later is not None and score(later.fit(found.chosen.terms)) < score(beam[0]):
+        fitter.balance.coarse = later.balance.coarse
+        return _begun_again(fitter, found, parents, ends), []
     near = [g for g in sorted(grown, key=score) if all(g is not m for m in beam)]
     near = [g for g in near if score(g) < score(beam[0]) + NEAR][:BEAM]
     law, best, left, found.elsewhere = fitter.balance.exponent, beam[0], math.inf, True
@@ -233,10 +246,9 @@ def _resettled(
         if fitter.balance.exponent != law:
             break
         best, *others = sorted(refitted(fitter, [best, *others]), key=lambda m: (m.at_bound, m.sse))
-    found.baseline = fitter.fit([])
     if fitter.balance.exponent != law:
-        parents[id(found.baseline)], found.beside = math.inf, None
-        return [found.baseline], []
+        return _begun_again(fitter, found, parents, ends), []
+    found.baseline = fitter.fit([])
     again = [best, *refitted(fitter, beam[1:])]
     parents.update({id(new): parents[id(old)] for new, old in zip(again, beam, strict=True)})
     # On its own friction an effect may go to a bound that it kept away from on a poorer one.
