@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import pytest
 from hypothesis import given
@@ -12,6 +13,7 @@ from recorded import run, stage, there_and_back
 from rtcomp.diagnosis.candidates.growing import grow, likeliest
 from rtcomp.diagnosis.fitting.baseline import baseline
 from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.starting import FULL, STARTS, as_they_are
 from rtcomp.diagnosis.forces.balance import ForceBalance
@@ -70,3 +72,23 @@ def test_starts_are_sorted_by_gain_but_the_smallest_error_is_among_the_first_two
         assert min(left for _, left in found[:STARTS]) == min(left for _, left in some)
     rest = found[2:]
     assert rest == sorted(rest, key=lambda one: -one[0])
+
+
+def test_each_effect_is_fitted_before_any_in_another_form() -> None:
+    """A fit finds another form by itself, and no other effect: forms of one must not keep others out."""
+    asked: list[list[str]] = []
+
+    class Watched(Fitter):
+        def rough(
+            self, model: Fitted, families: Sequence[Sequence[Term]], count: int, ends: float
+        ) -> list[Term]:
+            asked.append([str(family[0].entry["name"]) for family in families])
+            return []
+
+    balance = ForceBalance(stage(), load_data([run(stage(effects=[STRIBECK]), there_and_back(12.0))]))
+    base, fitter = baseline(balance), Watched(balance)
+    found = look(fitter, base)
+    grow(fitter, base, found.candidates, found.screened, -math.inf)
+    names = asked[0]
+    assert len(names) > len(set(names))
+    assert len(set(names[: len(set(names))])) == len(set(names))
