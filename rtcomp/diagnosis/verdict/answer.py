@@ -25,7 +25,7 @@ from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named
 from rtcomp.diagnosis.search.confidence import Alternatives
 from rtcomp.diagnosis.search.selection import Search
 from rtcomp.diagnosis.settings import LEAST_GAIN, LEFT, LEVEL, TOLERANCE
-from rtcomp.diagnosis.verdict.as_believed import MATTERS, agrees
+from rtcomp.diagnosis.verdict.as_believed import agrees
 from rtcomp.diagnosis.verdict.detectability import sights
 from rtcomp.diagnosis.verdict.experiment import next_experiment
 from rtcomp.diagnosis.verdict.one_cause import LENGTH, Cause, fixed_units, force_constant, one_cause
@@ -249,7 +249,8 @@ def _left_of_belief(fitter: Fitter, found: Search, believed: Stage, base: Fitted
 def _matters(fitter: Fitter, believed: Stage, retuned: Stage) -> bool:
     """Tell whether other numbers of the belief bring down an error that is not small already."""
     relative = float(np.sqrt(np.mean(fitter.left_by(believed)[fitter.rows] ** 2)))
-    return relative > TOLERANCE and float(_gains(fitter, believed, retuned).mean()) > MATTERS
+    least = -2.0 * math.log1p(-LEAST_GAIN)
+    return relative > TOLERANCE and float(_gains(fitter, believed, retuned).mean()) > least
 
 
 def _gains(fitter: Fitter, before: Stage, after: Stage) -> Floats:

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from rtcomp.diagnosis.fitting.fit import Fitter
-from rtcomp.diagnosis.numerics.significance import Null, log_gain
+from rtcomp.diagnosis.numerics.significance import Null
 from rtcomp.diagnosis.search.replicates import null_of_belief
 from rtcomp.diagnosis.search.selection import Search
-from rtcomp.diagnosis.settings import LEAST_GAIN, LEVEL, TOLERANCE
+from rtcomp.diagnosis.settings import BELIEF_SD, LEVEL, TOLERANCE
 from rtcomp.kernels import Floats
 from rtcomp.stage.stage import Stage
-
-MATTERS = -2.0 * math.log1p(-LEAST_GAIN)
-"""Gain of a change of the error that matters."""
 
 
 def as_loud(fitter: Fitter, believed: Stage, found: Search, seed: int) -> Null | None:
@@ -37,18 +32,16 @@ def as_loud(fitter: Fitter, believed: Stage, found: Search, seed: int) -> Null |
 
 
 def agrees(fitter: Fitter, believed: Stage, seed: int) -> bool:
-    """Tell whether the belief leaves no more than TOLERANCE, or no more that matters than its replicates.
+    """Tell whether the belief leaves no more, beyond its replicates, than its numbers may be off by.
 
-    Asked where nothing was found and no number moved: an objective that trusts no row finds nothing, whatever
-    is missing.
+    Asked where nothing was found and no number moved. An objective that trusts no row finds nothing, whatever
+    is missing; numbers that it cannot tell may still be off as far as they are believed (BELIEF_SD).
     """
-    unfitted = _left(fitter, believed)
-    if unfitted.sum() <= TOLERANCE**2 * np.count_nonzero(fitter.rows):
+    unfitted, enough = float(_left(fitter, believed).sum()), BELIEF_SD**2 * np.count_nonzero(fitter.rows)
+    if unfitted <= enough:
         return True
     own = null_of_belief(fitter.balance, believed, lambda data: _left(fitter.on(data), believed), seed)
-    if own is None:
-        return False
-    return own.p_of_error(unfitted) >= LEVEL or log_gain(unfitted, np.median(own.errors, axis=0)) <= MATTERS
+    return bool(own is not None and unfitted - own.noise <= enough)
 
 
 def _left(fitter: Fitter, believed: Stage) -> Floats:
