@@ -7,7 +7,7 @@ import math
 from rtcomp.grain import beyond_grain
 from rtcomp.kernels import Floats, compiled
 
-TURN = 2.0
+NO_TURN = 2.0
 """Grains within which what yields as a solid sees no turn: of white noise one of a few hundred rows is beyond
 (three deviations), and each turn makes it forget a part of its force."""
 LEAST_GAP = 1e-200
@@ -56,4 +56,4 @@ def without_noise(s: Floats, at: int, moved: float, grain: float) -> float:
 
     s[at]: place within the grain (m); s[at + 1]: direction of motion beyond it (`beyond_grain`).
     """
-    return beyond_grain(s, at, moved, TURN * grain)
+    return beyond_grain(s, at, moved, NO_TURN * grain)

@@ -27,7 +27,7 @@ POINTS = 5
 """Start values of a nonlinear parameter."""
 PEAKS = 3
 """Peaks taken of a periodogram."""
-ALIKE = 0.02
+ONE_WAVE = 0.02
 """Difference of the logarithm of periods that are found for one wave."""
 APART = 2.0
 """Ratio of neighbouring voltages at most: a fit finds its way from one to the next."""
@@ -166,7 +166,7 @@ def _periods(balance: ForceBalance, force: Floats, residual: Floats) -> Floats:
         found += [(float(share[n == k][0]), span / k) for k in highest(n, share, PEAKS, 0.05)]
     periods: list[float] = []
     for _, period in sorted(found, reverse=True):
-        if all(abs(np.log(period / other)) > ALIKE for other in periods):
+        if all(abs(np.log(period / other)) > ONE_WAVE for other in periods):
             periods.append(period)
     return np.sort(periods)
 
