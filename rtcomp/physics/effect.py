@@ -258,6 +258,10 @@ class Effect:
         """Largest damping (N s/m) it can put on the mass; bounds the integration step."""
         return 0.0
 
+    def damping_under(self, force: float) -> float:
+        """Largest damping (N s/m) at any speed that `force` (N) can hold, where it grows with the speed."""
+        return self.damping()
+
     def frequency(self) -> float:
         """Largest angular frequency (rad/s) it gives to any mass it stands on; bounds the integration step.
 

@@ -141,6 +141,10 @@ class QuadraticDrag(Effect):
         """Return the slope of the force at 1 m/s (1 rad/s) (N s/m)."""
         return 2.0 * abs(self.values["coefficient"])
 
+    def damping_under(self, force: float) -> float:
+        """Return the slope (N s/m) at the speed at which the drag is as large as `force` (N)."""
+        return 2.0 * math.sqrt(abs(self.values["coefficient"]) * force)
+
 
 @register
 class MicroDamping(Effect):

@@ -204,9 +204,13 @@ def largest_stiffness(stage: Stage, stroke: float | None = None) -> float:
 
 
 def largest_step(stage: Stage, stroke: float | None = None) -> float:
-    """Return the longest integration step (s) that resolves stiffness (within `stroke`, m) and damping."""
+    """Return the longest integration step (s) that resolves stiffness (within `stroke`, m) and damping.
+
+    Damping that grows with the speed is that of the fastest motion which the drive alone can hold.
+    """
     stiffness = largest_stiffness(stage, stroke)
-    damping = sum(e.damping() + stage.mass * e.frequency() for e in stage.chain)
+    most = stage.force_constant * stage.voltage_limit
+    damping = sum(e.damping_under(most) + stage.mass * e.frequency() for e in stage.chain)
     step = min(1.0 / stage.rate, *(e.longest_step() for e in stage.chain))
     if stiffness > 0:
         step = min(step, 0.03 * math.sqrt(stage.mass / stiffness))

@@ -125,6 +125,32 @@ def test_viscous_friction_against_the_exponential(coefficient):
     assert abs(simulator.velocity) < 1e-6 * v
 
 
+@pytest.mark.parametrize("coefficient", [1e-2, 1.0, 1e4, 1e8])
+def test_quadratic_drag_against_the_hyperbolic_tangent(coefficient):
+    mass, force = 2.0, 4.0
+    fastest, tau = np.sqrt(force / coefficient), mass / np.sqrt(force * coefficient)
+    drag = {"name": "quadratic-drag", "coefficient": coefficient}
+    t = 0.05 * tau * np.arange(1, 101)
+    out = drive(Simulator(stage(mass, effects=[drag], rate=1.0 / t[0])), np.ones(t.size), t[0])
+    assert np.allclose(out[:, 1], fastest * np.tanh(t / tau), rtol=2e-3, atol=1e-4 * fastest)
+
+
+@pytest.mark.parametrize("metre", [1e-3, 1e3])
+def test_the_step_does_not_depend_on_the_unit_of_length(metre):
+    """Lengths and forces so many times as large, stiffness and damping the same."""
+
+    def step(unit):
+        effects = [
+            {"name": "quadratic-drag", "coefficient": 5e5 / unit},
+            {"name": "parallel-spring", "stiffness": 1e3, "cubic": 1e9 / unit**2},
+        ]
+        m = {"mass": 2.0, "force_constant": 4.0 * unit, "voltage_limit": 10.0, "viscous": 20.0}
+        made = Stage.from_dict({"stage": {**m, "effects": effects}, "rate": 10.0})
+        return largest_step(made, 1e-2 * unit)
+
+    assert step(metre) == pytest.approx(step(1.0), rel=1e-9)
+
+
 def test_a_free_mass_accelerates():
     out = drive(Simulator(stage(2.0)), np.ones(500), 1e-3)
     assert out[-1, 1] == pytest.approx(4.0 / 2.0 * 0.5, rel=1e-9)
