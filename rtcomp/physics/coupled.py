@@ -21,7 +21,11 @@ CONTACT: Final = 300.0
 CONTACT_DAMPING: Final = 0.1
 """Damping ratio of the load on its contact: it bounces back with about three quarters of its speed."""
 FINEST: Final = 0.1
-"""Longest step (rad) of the contact's oscillation."""
+"""Longest step (rad) of the oscillation of a second mass, free or on its contact.
+
+The first mass moves at constant speed in a step. At its end a part of the second's force is missing: a twelfth
+of the square of this.
+"""
 
 
 @compiled
@@ -151,6 +155,11 @@ class Resonance(Effect):
         omega, damping = 2.0 * math.pi * self.values["frequency"], self.values["damping"]
         ratio = self.values["mass_ratio"]
         return omega * max(1.0 / math.sqrt(1.0 - ratio), 2.0 * damping * ratio / (1.0 - ratio))
+
+    def longest_step(self) -> float:
+        """Return a tenth of a radian of the second mass (s)."""
+        omega = 2.0 * math.pi * self.values["frequency"]
+        return FINEST / omega if self.values["mass_ratio"] != 0.0 else math.inf
 
 
 @register

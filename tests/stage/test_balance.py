@@ -221,3 +221,24 @@ def test_between_rows_a_position_is_the_cubic_through_both(terms: list[float], s
     time = np.arange(4) * 0.5
     motion = np.column_stack([time, cubic(time), cubic.deriv()(time), np.zeros(4), np.zeros(4)])
     assert between_rows(motion, 2, share) == pytest.approx(float(cubic(1.0 - 0.5 * share)), abs=1e-9)
+
+
+@pytest.mark.parametrize("own", [0.03, 0.1, 0.3])
+def test_a_second_mass_weighs_what_its_oscillation_makes_of_it(own: float) -> None:
+    """Of its own frequency, per row, and driven at 0.02: m1 + m2 / (1 - (w / w_own)^2)."""
+    rate, driven, mass, share = 1000.0, 0.02, 2.0, 0.4
+    t = np.arange(20_000) / rate
+    x = 1e-3 * np.sin(2 * np.pi * driven * rate * t) * np.clip(t / 5.0, 0.0, 1.0) ** 3
+    second = physics.build(
+        {"name": "resonance", "mass_ratio": share, "frequency": own * rate, "damping": 0.1}
+    )
+    bare = Stage.from_dict(
+        {"stage": {"mass": mass, "force_constant": 1.0, "voltage_limit": 1.0}, "rate": rate}
+    )
+    a = np.diff(x, 2, prepend=x[0], append=x[-1]) * rate**2
+    f = forces(bare, [second], t, x, np.gradient(x, t), a, np.zeros(t.size))
+    needed, rows = f.mass * a - f.others(), slice(8000, 19_000)
+    found = float(a[rows] @ needed[rows] / (a[rows] @ a[rows]))
+    swung = 1.0 - (driven / own) ** 2 + 2j * 0.1 * driven / own
+    answer = mass * (1.0 - share + share * (1.0 + 2j * 0.1 * driven / own) / swung)
+    assert found == pytest.approx(answer.real, rel=2e-3)

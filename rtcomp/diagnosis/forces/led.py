@@ -31,7 +31,7 @@ def way_there(segment: Segment, sensors: Sequence[Effect]) -> Floats | None:
 def led_there(
     stage: Stage, chain: list[Effect], segment: Segment, path: Path, sensors: Sequence[Effect] = ()
 ) -> tuple[Floats, Floats]:
-    """Return the moving mass (kg) and the push (N), each (K,), of effects along a segment.
+    """Return the moving mass (kg) and the push around the rows (N), each (K,), of effects along a segment.
 
     They are led along the way to it first, where there is one. Its rows are far apart; the catalogue's second
     mass is exact for any length of a step.
@@ -45,4 +45,4 @@ def led_there(
         led = np.stack([time, x, v, np.gradient(v, time), np.zeros(time.size)])[:, :-1]  # it ends at this row
         first, motion = led.shape[1], np.concatenate([led, motion], axis=1)
     f = forces(stage, chain, *motion)
-    return f.mass[first:], f.push[first:]
+    return f.mass[first:], f.others()[first:]

@@ -210,7 +210,7 @@ class Signals:
                 for some, path in ((second_masses, p), (on_load, load)):
                     if some:
                         moving, push = led_there(self.stage, some, s, path, sensors)
-                        a = (a * moving - around_rows(push)) / self.stage.mass
+                        a = (a * moving - push) / self.stage.mass
                 if carried is not None:
                     a = a + carried.play.values["share"] * (load.a - p.a)
                 found.append(a)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.mismatch.curves import Curve, curve_of
 from rtcomp.diagnosis.mismatch.locate import axes_of
-from rtcomp.diagnosis.numerics.spectrum import Response, filtered, interpolated
+from rtcomp.diagnosis.numerics.spectrum import Response, filtered, interpolated, spectrum
 from rtcomp.diagnosis.recordings.data import Segment
 from rtcomp.kernels import Floats
 
@@ -76,9 +76,17 @@ def as_white(balance: ForceBalance, force: Floats) -> Floats:
 
 
 def as_seen(balance: ForceBalance, force: Floats) -> Floats:
-    """Return what of a force (N, (n,)) on the compared rows stands above the sensor's noise."""
-    frequency, share, _ = _seen(balance)
-    return _weighed(balance, force, interpolated(frequency, np.maximum(share, 1e-6)))
+    """Return what of a force (N, (n,)) on the compared rows stands above the sensor's noise.
+
+    At each frequency as far as that force or the drive's does: a tone need not be among what the drive does.
+    """
+    frequency, share, noise = _seen(balance)
+    own, density = spectrum(list(_by_segment(balance, force)), balance.data.rate / balance.whitening.thinning)
+    alone = np.pad(_above(np.interp(own, frequency, noise) * balance.noise.wiener(own) ** 2, density), 1)
+    alone = np.max([alone[:-2], alone[1:-1], alone[2:]], axis=0)  # a tone may lie at the edge of its band
+    both = np.union1d(frequency, own)
+    most = np.maximum(np.interp(both, frequency, share), np.interp(both, own, alone))
+    return _weighed(balance, force, interpolated(both, np.maximum(most, 1e-6)))
 
 
 def noise_seen(balance: ForceBalance) -> float:
@@ -91,19 +99,26 @@ def noise_seen(balance: ForceBalance) -> float:
 def _seen(balance: ForceBalance) -> tuple[Floats, Floats, Floats]:
     """Return frequencies (Hz), the part of the drive's force that is no noise, and that noise (N^2/Hz)."""
     frequency, density, noise = balance.force_densities()
-    return frequency, np.maximum(1.0 - noise / np.maximum(density, 1e-300), 0.0), noise
+    return frequency, _above(noise, density), noise
+
+
+def _above(noise: Floats, density: Floats) -> Floats:
+    """Return the part of a density that is no noise."""
+    return np.maximum(1.0 - noise / np.maximum(density, 1e-300), 0.0)
+
+
+def _by_segment(balance: ForceBalance, signal: Floats) -> Iterator[Floats]:
+    """Yield the compared rows (n,) of each segment."""
+    at = 0
+    for s in balance.data.segments:
+        count = s.time[balance.whitening.rows(s)].size
+        yield signal[at : at + count]
+        at += count
 
 
 def _weighed(balance: ForceBalance, signal: Floats, response: Response) -> Floats:
-    white = balance.whitening
-    out, at = [], 0
-    for s in balance.data.segments:
-        count = s.time[white.rows(s)].size
-        out.append(
-            filtered(signal[at : at + count], balance.data.rate / white.thinning, response, noisy=True)
-        )
-        at += count
-    return np.concatenate(out)
+    rate = balance.data.rate / balance.whitening.thinning
+    return np.concatenate([filtered(s, rate, response, noisy=True) for s in _by_segment(balance, signal)])
 
 
 def curves(

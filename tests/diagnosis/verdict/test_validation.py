@@ -27,18 +27,22 @@ def test_reserved_blocks_judge_once() -> None:
 
 
 def test_a_judgement_counts_forces_that_stand_above_the_sensors_noise() -> None:
-    """A tone in the band of the motion is kept; one beyond that of the drive's force is nearly gone."""
+    """A tone in the drive's band is kept; beyond it one above the noise is, one within the noise is not."""
     believed = Stage.from_dict({**STAGE, "sensor": {"noise": 5e-7, "resolution": 1e-8}})
     balance = ForceBalance(believed, load_data([run(believed, there_and_back(20.0))]))
     baseline(balance)
     time = balance.plain([s.time for s in balance.data.segments])
-    most = 0.4 / float(np.median(np.diff(time)))
-    left = [
-        float(np.std(as_seen(balance, np.sin(2.0 * np.pi * hertz * time))) * np.sqrt(2.0))
-        for hertz in (1.0, min(2.0 * balance.force_bandwidth, most))
-    ]
-    assert left[0] > 0.97
-    assert left[1] < 0.1
+    beyond = 0.9 * balance.noise.bandwidth
+    assert beyond > balance.force_bandwidth
+
+    def kept(hertz: float, size: float) -> float:
+        """Return the part that is left of a tone of `size` (N)."""
+        tone = size * np.sin(2.0 * np.pi * hertz * time)
+        return float(np.std(as_seen(balance, tone)) / np.std(tone))
+
+    assert kept(1.0, 1.0) > 0.97
+    assert kept(beyond, 20.0 * balance.noise_power**0.5) > 0.95
+    assert kept(beyond, 0.02 * balance.noise_power**0.5) < 0.1
     assert noise_seen(balance) < 1.05 * balance.noise_power**0.5
 
 
