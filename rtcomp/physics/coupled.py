@@ -23,8 +23,8 @@ CONTACT_DAMPING: Final = 0.1
 FINEST: Final = 0.1
 """Longest step (rad) of the oscillation of a second mass, free or on its contact.
 
-The first mass moves at constant speed in a step. At its end a part of the second's force is missing: a twelfth
-of the square of this.
+The first mass moves at constant speed in a step. At its end a part of the second's force is missing: a
+twelfth of the square of this.
 """
 
 
