@@ -65,15 +65,21 @@ def drive_saturation(p: Floats, s: Floats, w: Floats) -> None:
 
 @effect_kernel
 def drive_lag(p: Floats, s: Floats, w: Floats) -> None:
-    """p: time constant (s); s: lagged voltage (V). Exact for a voltage held over the step."""
-    keep = math.exp(-w[STEP] / p[0]) if p[0] > 0.0 else 0.0
-    s[0] = w[VOLTS] + (s[0] - w[VOLTS]) * keep
-    w[VOLTS] = s[0]
+    """p: time constant (s); s: lagged voltage (V). Exact for a voltage held over the step.
+
+    VOLTS becomes the mean of the lagged voltage over the step; at a step of no length, that of this instant.
+    """
+    if p[0] <= 0.0:
+        s[0] = w[VOLTS]
+        return
+    passed, before = w[STEP] / p[0], s[0] - w[VOLTS]
+    s[0] = w[VOLTS] + before * math.exp(-passed)
+    w[VOLTS] += before * (-math.expm1(-passed) / passed if passed > 0.0 else 1.0)
 
 
 @effect_kernel
 def drive_lag_inverse(p: Floats, s: Floats, w: Floats) -> None:
-    """p: time constant (s); s: lagged voltage (V). VOLTS becomes what, held over the step, gives it."""
+    """p: time constant (s); s: lagged voltage (V). VOLTS becomes what, held, gives it at the step's end."""
     keep = math.exp(-w[STEP] / p[0]) if p[0] > 0.0 else 0.0
     wanted = w[VOLTS]
     if keep < 1.0:
@@ -219,6 +225,7 @@ class DriveLag(Effect):
     neutral = {"time_constant": 0.0}
     linear = ("time_constant",)
     command_only = True
+    averages = True
     order = 50
     states = 1
 

@@ -49,6 +49,18 @@ def stage_with(entry: type[physics.Effect]) -> Stage:
     return PLAIN.with_changes(stage={"effects": [{"name": entry.name, **entry.example}]})
 
 
+FREE = PLAIN.with_changes(stage={"friction": [], "micro_damping": 0.0})
+"""Without friction nothing is stiff: a step of its simulation is as long as a row."""
+FAST = [
+    {**entry.example, "name": entry.name, p.name: value}
+    for entry in physics.entries()
+    for p in entry.parameters
+    for value in {"s": (3e-4, 1e-3, 3e-3), "Hz": (30.0, 100.0, 200.0)}.get(p.unit, ())
+    if entry.searchable and not entry.behind and entry.place in (Place.DRIVE, Place.MECHANICS)
+]
+"""Effects of the drive and of the mass that change within a few rows, or within one."""
+
+
 def recorded(stage: Stage, seconds: float = 6.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Closed loop: strokes of a millimetre and of micrometres, a rest at the end. Time, position, voltage."""
     rate, simulator = stage.rate, Simulator(stage)
@@ -81,6 +93,17 @@ def test_the_balance_is_that_of_the_simulation(entry: type[physics.Effect]) -> N
     assert with_it < 0.03
     if entry.name != "maxwell-slip" or stage.friction != PLAIN.friction:
         assert without > 2 * with_it
+
+
+@pytest.mark.parametrize("entry", FAST, ids=lambda e: " ".join(map(str, e.values())))
+def test_the_balance_is_that_of_the_simulation_within_a_row(entry: dict[str, float | str]) -> None:
+    stage = FREE.with_changes(stage={"effects": [entry]})
+    least = force_balance(FREE, *recorded(FREE)).relative_error
+    t, position, voltage = recorded(stage)
+    with_it = force_balance(stage, t, position, voltage).relative_error
+    without = force_balance(FREE, t, position, voltage).relative_error
+    print(entry, least, with_it, without)
+    assert with_it < 2.0 * least + 0.15 * without
 
 
 @pytest.mark.parametrize("name", sorted(MODELS))

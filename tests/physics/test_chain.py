@@ -61,10 +61,14 @@ def test_saturation_and_offset(u):
 @settings(deadline=None)
 @given(pieces=st.integers(1, 50), constant=st.floats(1e-5, 1.0))
 def test_lag_is_exact_for_a_held_voltage_however_the_step_is_split(pieces, constant):
-    rows = new_rows(pieces)
+    """Its mean over the steps, and at a step of no length what it has come to."""
+    rows = new_rows(pieces + 1)
     rows[:, STEP], rows[:, VOLTS] = 0.01 / pieces, 6.0
-    out = over_rows([build({"name": "drive-lag", "time_constant": constant})], rows)[-1, VOLTS]
-    assert out == pytest.approx(6.0 * -math.expm1(-0.01 / constant), rel=1e-9)
+    rows[-1, STEP] = 0.0
+    out = over_rows([build({"name": "drive-lag", "time_constant": constant})], rows)[:, VOLTS]
+    part = -math.expm1(-0.01 / constant)
+    assert out[-1] == pytest.approx(6.0 * part, rel=1e-9)
+    assert out[:-1].mean() == pytest.approx(6.0 * (1.0 - constant / 0.01 * part), rel=1e-6)
 
 
 def test_gain_ripple_and_back_emf_around_the_force():

@@ -76,6 +76,19 @@ def test_a_late_command_gives_its_impulse_whenever_it_changes(delay, substeps):
     assert np.abs(found[:, 0] - np.interp(edges[1:], time, way)).max() < 4.0 * 5.0 / 2.0 * step**2 * 40
 
 
+@settings(max_examples=40, deadline=None)
+@given(constant=st.floats(1e-6, 0.1), substeps=st.integers(1, 5))
+def test_a_lagged_command_gives_its_impulse_however_short_the_lag(constant, substeps):
+    axis = stage(mass=2.0, effects=[{"name": "drive-lag", "time_constant": constant}])
+    volts = np.random.default_rng(3).uniform(-5.0, 5.0, 40)
+    found = drive(Simulator(axis, substeps=substeps), volts, 1e-3)
+    lagged = speed = 0.0
+    for u, reached in zip(volts.tolist(), found[:, 1].tolist(), strict=True):
+        speed += 4.0 / 2.0 * (1e-3 * u + (lagged - u) * -np.expm1(-1e-3 / constant) * constant)
+        lagged = u + (lagged - u) * np.exp(-1e-3 / constant)
+        assert reached == pytest.approx(speed, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     "drive_of", [{"name": "drive-delay", "delay": 1e-12}, {"name": "back-emf", "coefficient": 1e-9}]
 )
