@@ -18,7 +18,6 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.forces.balance import ForceBalance
-from rtcomp.diagnosis.mismatch.where import as_white
 from rtcomp.diagnosis.numerics.periodogram import highest, peak_near, periodogram
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Parameter
@@ -76,10 +75,11 @@ class Scales:
         moving = v[v > 1e-3 * v.max()] if v.max() > 0 else v
         slow, fast = (max(float(np.quantile(moving, q)), 1e-12) for q in (0.02, 0.9))
         speed = np.geomspace(slow, fast, POINTS)
-        force = fitter.force(fitted) * ~balance.reserved[balance.block]
+        used = ~balance.reserved[balance.block]
+        force, white = fitter.force(fitted) * used, fitter.whitened(fitted) * used
         return cls(
             balance,
-            (force, as_white(balance, force)),
+            (force, white),
             (max(2.0 * balance.grain, 1e-5 * (high - low)), 0.5 * (high - low)),
             (low, high),
             speed,

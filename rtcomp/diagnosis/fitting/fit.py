@@ -35,7 +35,7 @@ from rtcomp.diagnosis.fitting.solved import Posed, Solved
 from rtcomp.diagnosis.fitting.stage_of import stage_of
 from rtcomp.diagnosis.forces.balance import BASE, ForceBalance
 from rtcomp.diagnosis.forces.noise import Noise
-from rtcomp.diagnosis.mismatch.where import as_force, as_seen
+from rtcomp.diagnosis.mismatch.where import as_force, as_seen, as_white
 from rtcomp.diagnosis.numerics.regression import Grams, Prior, System
 from rtcomp.diagnosis.recordings.data import Data
 from rtcomp.diagnosis.result import PositionFit
@@ -114,6 +114,10 @@ class Fitter:
     def force(self, model: Fitted) -> Floats:
         """Return the force (N) that a model leaves open on the compared rows of the balance."""
         return as_force(self.balance, model.residual)
+
+    def whitened(self, model: Fitted) -> Floats:
+        """Return that force whitened, (n,): each frequency over its noise."""
+        return model.residual if self.by_force else as_white(self.balance, self.force(model))
 
     def without(self, model: Fitted, at: int) -> Floats:
         """Return the force (N) that a model leaves open without its effect number `at`, others as are."""

@@ -9,6 +9,7 @@ from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.fitting.replicated import replicated
 from rtcomp.diagnosis.numerics.significance import log_gain
 from rtcomp.diagnosis.settings import LEAST_GAIN, NEGLIGIBLE
 
@@ -38,7 +39,8 @@ def law_of(fitter: Fitter, terms: Sequence[Term]) -> float:
     first, second = shared(beside, (was, other))
     if not first[1].coefficients[balance.friction].any():
         return balance.exponent
-    law, best = (other, second) if _less(first, second) else (was, first)
+    to_other = _less(first, second) or _explains_more(first, second)
+    law, best = (other, second) if to_other else (was, first)
     return law if law == STOP else _settled(*best)
 
 
@@ -61,6 +63,23 @@ def _less(one: tuple[Fitter, Fitted], other: tuple[Fitter, Fitted]) -> bool:
     before, after = (fitter.relative(model, seen=True) ** 2 for fitter, model in (one, other))
     gained = log_gain(one[1].errors, other[1].errors)
     return gained > 2.0 * LEAST_GAIN and before - after > NEGLIGIBLE**2
+
+
+def _explains_more(one: tuple[Fitter, Fitted], other: tuple[Fitter, Fitted]) -> bool:
+    """Tell whether most of what the other model leaves is noise, most of what the one leaves is not.
+
+    Asked where both leave as much. Friction that yields within a few counts forgets by motion that no reading
+    tells: replicates of the one law leave that, of the other they do not.
+    """
+    if abs(log_gain(one[1].errors, other[1].errors)) > 2.0 * LEAST_GAIN:
+        return False
+    return not _mostly_noise(*one) and _mostly_noise(*other)
+
+
+def _mostly_noise(fitter: Fitter, model: Fitted) -> bool:
+    """Tell whether a model leaves more than half as much of a replicate of its own."""
+    data = replicated(fitter, model)
+    return data is not None and 2.0 * fitter.on(data).fit(model.terms, model, steps=0).sse > model.sse
 
 
 def _settled(solid: Fitter, model: Fitted) -> float:
