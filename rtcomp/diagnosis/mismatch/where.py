@@ -19,6 +19,10 @@ ROUNDING = 1e-9
 """Part of the force up to which what an effect does is nothing."""
 
 
+NARROW = 5
+"""Bands of a spectrum, of which a line has fewer: what has as many is no line."""
+
+
 @dataclass(frozen=True)
 class Compared:
     """See `view.View`."""
@@ -78,14 +82,18 @@ def as_white(balance: ForceBalance, force: Floats) -> Floats:
 def as_seen(balance: ForceBalance, force: Floats) -> Floats:
     """Return what of a force (N, (n,)) on the compared rows stands above the sensor's noise.
 
-    At each frequency as far as that force or the drive's does: a tone need not be among what the drive does.
+    At each frequency as far as the drive's force does, or as a line of that force does, above what is beside
+    it as well: a tone need not be among what the drive does.
     """
+    from scipy.ndimage import grey_opening
+
     frequency, share, noise = _seen(balance)
     own, density = spectrum(list(_by_segment(balance, force)), balance.data.rate / balance.whitening.thinning)
-    alone = np.pad(_above(np.interp(own, frequency, noise) * balance.noise.wiener(own) ** 2, density), 1)
-    alone = np.max([alone[:-2], alone[1:-1], alone[2:]], axis=0)  # a tone may lie at the edge of its band
+    louder = density / np.maximum(np.interp(own, frequency, noise) * balance.noise.wiener(own) ** 2, 1e-300)
+    line = np.pad(_above(np.maximum(grey_opening(louder, NARROW), 1.0), louder), 1)
+    line = np.max([line[:-2], line[1:-1], line[2:]], axis=0)  # it may lie at the edge of its band
     both = np.union1d(frequency, own)
-    most = np.maximum(np.interp(both, frequency, share), np.interp(both, own, alone))
+    most = np.maximum(np.interp(both, frequency, share), np.interp(both, own, line))
     return _weighed(balance, force, interpolated(both, np.maximum(most, 1e-6)))
 
 
