@@ -65,14 +65,11 @@ def drive_saturation(p: Floats, s: Floats, w: Floats) -> None:
 
 @effect_kernel
 def drive_lag(p: Floats, s: Floats, w: Floats) -> None:
-    """p: time constant (s); s: lagged voltage (V). Exact for a voltage held over the step.
+    """p: time constant (s); s: lagged voltage (V). VOLTS becomes its exact mean over a step with VOLTS held.
 
-    VOLTS becomes the mean of the lagged voltage over the step; at a step of no length, that of this instant.
+    At a step of no length, that of this instant.
     """
-    if p[0] <= 0.0:
-        s[0] = w[VOLTS]
-        return
-    passed, before = w[STEP] / p[0], s[0] - w[VOLTS]
+    passed, before = w[STEP] / p[0] if p[0] > 0.0 else math.inf, s[0] - w[VOLTS]
     s[0] = w[VOLTS] + before * math.exp(-passed)
     w[VOLTS] += before * (-math.expm1(-passed) / passed if passed > 0.0 else 1.0)
 

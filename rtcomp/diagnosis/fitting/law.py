@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from rtcomp.diagnosis import entries as ent
@@ -68,18 +69,22 @@ def _less(one: tuple[Fitter, Fitted], other: tuple[Fitter, Fitted]) -> bool:
 def _explains_more(one: tuple[Fitter, Fitted], other: tuple[Fitter, Fitted]) -> bool:
     """Tell whether most of what the other model leaves is noise, most of what the one leaves is not.
 
-    Asked where both leave as much. Friction that yields within a few counts forgets by motion that no reading
-    tells: replicates of the one law leave that, of the other they do not.
+    And whether it is likelier, by the variance that its replicates have. Friction that yields within a few
+    counts forgets by motion that no reading tells: replicates of one law leave that, of the other they do not.
     """
-    if abs(log_gain(one[1].errors, other[1].errors)) > 2.0 * LEAST_GAIN:
+    noise = _noise(*one)
+    if 2.0 * noise >= one[1].sse or noise == 0.0:
         return False
-    return not _mostly_noise(*one) and _mostly_noise(*other)
+    others = _noise(*other)
+    if 2.0 * others <= other[1].sse:
+        return False
+    return math.log(others) + other[1].sse / others < math.log(noise) + one[1].sse / noise
 
 
-def _mostly_noise(fitter: Fitter, model: Fitted) -> bool:
-    """Tell whether a model leaves more than half as much of a replicate of its own."""
+def _noise(fitter: Fitter, model: Fitted) -> float:
+    """Return the squared error that a model leaves of a replicate of its own; 0 where there is none."""
     data = replicated(fitter, model)
-    return data is not None and 2.0 * fitter.on(data).fit(model.terms, model, steps=0).sse > model.sse
+    return 0.0 if data is None else fitter.on(data).fit(model.terms, model, steps=0).sse
 
 
 def _settled(solid: Fitter, model: Fitted) -> float:

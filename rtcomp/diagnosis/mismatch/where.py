@@ -90,7 +90,7 @@ def as_seen(balance: ForceBalance, force: Floats) -> Floats:
     frequency, share, noise = _seen(balance)
     own, density = spectrum(list(_by_segment(balance, force)), balance.data.rate / balance.whitening.thinning)
     louder = density / np.maximum(np.interp(own, frequency, noise) * balance.noise.wiener(own) ** 2, 1e-300)
-    line = np.pad(_above(np.maximum(grey_opening(louder, NARROW), 1.0), louder), 1)
+    line = np.pad(_above(np.maximum(grey_opening(louder, (NARROW,)), 1.0), louder), 1)
     line = np.max([line[:-2], line[1:-1], line[2:]], axis=0)  # it may lie at the edge of its band
     both = np.union1d(frequency, own)
     most = np.maximum(np.interp(both, frequency, share), np.interp(both, own, line))

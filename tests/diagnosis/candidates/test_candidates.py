@@ -18,6 +18,7 @@ from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.search.confidence import explains_another
 from rtcomp.kernels import Floats
+from rtcomp.stage.stage import Stage
 
 WAVE = {"name": "cogging", "amplitude": 0.4, "period": 1.3e-4, "phase": 0.4}
 TONE = {"name": "tonal-disturbance", "amplitude": 0.4, "frequency": 23.0, "phase": 0.0}
@@ -78,3 +79,24 @@ def test_a_rival_of_an_effect_explains_the_same(
     rest = shaken.fit([])
     models = [shaken.fit([Term.of(e)], rest) for e in (chosen, other)]
     assert explains_another(shaken, models[0], rest, models[1], math.inf) is apart
+
+
+def test_waves_are_looked_for_in_what_the_fit_leaves_of_all_blocks_but_the_reserved() -> None:
+    """On an air bearing what is slow counts ten thousandfold: cut out as a force, it would ring."""
+
+    def air(*effects: dict[str, object]) -> Stage:
+        own = {"mass": 8.0, "force_constant": 40.0, "viscous": 5.0, "voltage_limit": 10.0}
+        return Stage.from_dict(
+            {
+                "stage": {**own, "effects": list(effects)},
+                "sensor": {"noise": 3e-9, "resolution": 5e-9},
+                "controller": {"kp": 1.9e4, "ki": 9.7e5, "kd": 88.0},
+                "rate": RATE,
+            }
+        )
+
+    t = np.arange(20_000) / RATE
+    reference = 2e-2 * (1.0 - np.exp(-t)) * (np.sin(2 * np.pi * 0.7 * t) + 0.5 * np.sin(2 * np.pi * 1.9 * t))
+    balance = ForceBalance(air(), load_data([run(air({**TONE, "frequency": 7.3}), reference)]))
+    base, fitter = baseline(balance), Fitter(balance)
+    np.testing.assert_array_equal(Scales.of(fitter, base).residual[1], base.residual * fitter.rows)

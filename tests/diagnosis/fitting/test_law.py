@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from recorded import STAGE, run, stage, there_and_back
+from recorded import RATE, STAGE, run, stage, there_and_back
 
 from rtcomp.diagnosis.fitting.baseline import baseline
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.free import Term
-from rtcomp.diagnosis.fitting.law import law_of
+from rtcomp.diagnosis.fitting.law import SOLID, STOP, law_of
 from rtcomp.diagnosis.fitting.retuned import level_and_reach
 from rtcomp.diagnosis.fitting.stage_of import bank
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.physics.maxwell_slip import MaxwellSlip
+from rtcomp.stage.stage import Stage
 
 ELEMENTS = [(e["stiffness"], e["reach"]) for e in STAGE["stage"]["friction"]]
 
@@ -30,6 +31,39 @@ def test_it_is_that_of_the_recording(believed: float, true: float) -> None:
     written = fitter.stage(base).friction
     assert isinstance(written, MaxwellSlip) and written.exponent == balance.exponent
     assert written.level == pytest.approx(sum(k * r for k, r in ELEMENTS), rel=0.05)
+
+
+@pytest.mark.parametrize("true", [STOP, SOLID])
+def test_within_a_few_counts_it_is_told_by_what_friction_forgets_unseen(true: float) -> None:
+    """Both laws leave the same of the recording, but only a solid leaves as much of its own replicates."""
+    solid, level, reach = bank([(1.25e7, 5.7e-6)], SOLID), 71.5, 5.7e-6
+    reaches = reach * np.geomspace(0.15, 4.0, 7)
+    slopes = np.diff(level * -np.expm1(-np.append(0.0, reaches) / reach)) / np.diff(np.append(0.0, reaches))
+    stops = bank(list(zip((-np.diff(np.append(slopes, 0.0))).tolist(), reaches.tolist(), strict=True)), STOP)
+
+    def screw(exponent: float) -> Stage:
+        own = {"mass": 66.0, "force_constant": 115.0, "viscous": 1900.0, "voltage_limit": 10.0}
+        return Stage.from_dict(
+            {
+                "stage": {**own, "friction": solid if exponent == SOLID else stops},
+                "sensor": {"noise": 3e-8, "resolution": 1e-6},
+                "controller": {"kp": 4e3, "ki": 5.5e4, "kd": 67.0},
+                "rate": RATE,
+            }
+        )
+
+    random, x = np.random.default_rng(1), 0.0
+    moves = []
+    while sum(m.size for m in moves) < 30_000:
+        there, s = random.uniform(-2.5e-2, 2.5e-2), np.linspace(0.0, 1.0, int(random.uniform(600, 2500)))
+        moves += [
+            x + (there - x) * s**3 * (10.0 - 15.0 * s + 6.0 * s**2),
+            np.full(random.integers(1, 800), there),
+        ]
+        x = there
+    balance = ForceBalance(screw(STOP), load_data([run(screw(true), np.concatenate(moves))]))
+    baseline(balance)
+    assert balance.exponent == true
 
 
 def test_numbers_and_form_of_an_effect_that_suit_one_law_do_not_hide_another() -> None:

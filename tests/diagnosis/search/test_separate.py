@@ -51,7 +51,7 @@ def test_without_time_the_blocks_alone_tell(fitted: tuple[Fitter, Fitted, Fitted
 
 @pytest.mark.parametrize("name", ["drive-delay", "sensor-delay"])
 def test_a_dead_time_is_told_on_both_sides_whatever_stands_beside_it(name: str) -> None:
-    limit, late = {"name": "drive-saturation", "limit": 0.6}, {"name": name, "delay": 2.5e-3}
+    limit, late = {"name": "drive-saturation", "limit": 0.5}, {"name": name, "delay": 2.5e-3}
     balance = ForceBalance(stage(), load_data([run(stage(effects=[limit, late]), there_and_back(20.0))]))
     base, fitter = baseline(balance), Fitter(balance)
     found = Search(base, fitter.fit([Term.of(late), Term.of(limit)], base))
