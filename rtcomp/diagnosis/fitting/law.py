@@ -70,7 +70,7 @@ def _explains_more(one: tuple[Fitter, Fitted], other: tuple[Fitter, Fitted]) -> 
     """Tell whether most of what the other model leaves is noise, most of what the one leaves is not.
 
     And whether it is likelier, by the variance that its replicates have. Friction that yields within a few
-    counts forgets by motion that no reading tells: replicates of one law leave that, of the other they do not.
+    counts forgets by motion that no reading tells: replicates of one law leave that, of the other less.
     """
     noise = _noise(*one)
     if 2.0 * noise >= one[1].sse or noise == 0.0:
