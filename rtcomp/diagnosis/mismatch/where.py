@@ -17,8 +17,6 @@ from rtcomp.kernels import Floats
 
 ROUNDING = 1e-9
 """Part of the force up to which what an effect does is nothing."""
-
-
 NARROW = 5
 """Bands of a spectrum, of which a line has fewer: what has as many is no line."""
 
