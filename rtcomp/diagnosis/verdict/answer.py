@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from rtcomp.diagnosis.fitting.unbiased import unbiased
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.mismatch.curves import left_over
 from rtcomp.diagnosis.mismatch.locate import locate
-from rtcomp.diagnosis.mismatch.where import Compared, curves
+from rtcomp.diagnosis.mismatch.where import Compared, as_seen, curves
 from rtcomp.diagnosis.numerics.significance import SURE
 from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
 from rtcomp.diagnosis.search.confidence import Alternatives
@@ -83,7 +84,7 @@ def answer(
     notes = _notes(balance, found)
     shares = _shares(base, chosen, sets)
     named = _named(fitter, chosen, spans, sets, shares, rest)
-    if named and _worse(_gains(fitter, fitter.stage(base), fitter.stage(chosen))):
+    if named and _worse(_gains(fitter, partial(seen_by, fitter), fitter.stage(base), fitter.stage(chosen))):
         notes.append(f"{', '.join(ent.names(chosen.entries))}: {NOT_BORNE_OUT}")
         named = []
     final = chosen if named else base
@@ -250,14 +251,22 @@ def _matters(fitter: Fitter, believed: Stage, retuned: Stage) -> bool:
     """Tell whether other numbers of the belief bring down an error that is not small already."""
     relative = float(np.sqrt(np.mean(fitter.left_by(believed)[fitter.rows] ** 2)))
     least = -2.0 * math.log1p(-LEAST_GAIN)
-    return relative > TOLERANCE and float(_gains(fitter, believed, retuned).mean()) > least
+    return relative > TOLERANCE and float(_gains(fitter, fitter.left_by, believed, retuned).mean()) > least
 
 
-def _gains(fitter: Fitter, before: Stage, after: Stage) -> Floats:
+def _gains(fitter: Fitter, left_by: Callable[[Stage], Floats], before: Stage, after: Stage) -> Floats:
     """Return the gain of one stage on another in each block that was fitted, (B_use,)."""
-    left = (fitter.left_by(stage) ** 2 for stage in (before, after))
+    left = (left_by(stage) ** 2 for stage in (before, after))
     sums = [np.bincount(fitter.block, each, fitter.blocks)[fitter.use] for each in left]
     return np.asarray(np.diff(-np.log(np.maximum(sums, 1e-300)), axis=0)[0])
+
+
+def seen_by(fitter: Fitter, stage: Stage) -> Floats:
+    """Return what a stage leaves in each row, (n,), of forces above the noise, which goes by the mass."""
+    if not fitter.by_force:
+        return fitter.left_by(stage)
+    drive, needed = fitter.balance.both_sides(stage)
+    return as_seen(fitter.balance, drive - needed)
 
 
 def _worse(gains: Floats) -> bool:
