@@ -40,15 +40,6 @@ PLAIN = Stage.from_dict(
         "rate": 1000.0,
     }
 )
-
-
-def stage_with(entry: type[physics.Effect]) -> Stage:
-    """The plain stage with the example of `entry`; a friction model in the place of its own."""
-    if entry.name in MODELS:
-        return PLAIN.with_changes(stage={"friction": {"model": entry.name, **entry.example}})
-    return PLAIN.with_changes(stage={"effects": [{"name": entry.name, **entry.example}]})
-
-
 FREE = PLAIN.with_changes(stage={"friction": [], "micro_damping": 0.0})
 """Without friction nothing is stiff: a step of its simulation is as long as a row."""
 FAST = [
@@ -59,6 +50,13 @@ FAST = [
     if entry.searchable and not entry.behind and entry.place in (Place.DRIVE, Place.MECHANICS)
 ]
 """Effects of the drive and of the mass that change within a few rows, or within one."""
+
+
+def stage_with(entry: type[physics.Effect]) -> Stage:
+    """The plain stage with the example of `entry`; a friction model in the place of its own."""
+    if entry.name in MODELS:
+        return PLAIN.with_changes(stage={"friction": {"model": entry.name, **entry.example}})
+    return PLAIN.with_changes(stage={"effects": [{"name": entry.name, **entry.example}]})
 
 
 def recorded(stage: Stage, seconds: float = 6.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

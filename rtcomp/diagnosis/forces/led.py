@@ -33,8 +33,8 @@ def led_there(
 ) -> tuple[Floats, Floats]:
     """Return the moving mass (kg) and the push around the rows (N), each (K,), of effects along a segment.
 
-    They are led along the way to it first, where there is one. Its rows are far apart; the catalogue's second
-    mass is exact for any length of a step.
+    They are led along the way to it first, where there is one. Its rows are far apart; a second mass is exact
+    for any length of a step in which the first moves at constant speed.
     """
     way = way_there(segment, sensors)
     motion = np.stack([segment.time, path.x, path.v, path.a, segment.voltage])
