@@ -26,35 +26,45 @@ FINEST: Final = 0.1
 The first mass moves at constant speed in a step. At its end a part of the second's force is missing: a
 twelfth of the square of this.
 """
+SAME: Final = 1e-9
+"""Relative difference of two steps that rounding of their ends makes."""
 
 
 @compiled
 def swing(q: float, r: float, omega: float, zeta: float, h: float) -> tuple[float, float]:
     """Return deflection and rate of a free damped oscillation after `h`: exact, for 0 <= zeta < 1."""
+    qq, qr, rq, rr = swinging(omega, zeta, h)
+    return qq * q + qr * r, rq * q + rr * r
+
+
+@compiled
+def swinging(omega: float, zeta: float, h: float) -> tuple[float, float, float, float]:
+    """Return what a step of `h` makes of deflection and rate: deflection by each, rate by each."""
     decay = zeta * omega
     turning = omega * math.sqrt(1.0 - zeta * zeta)
     fade = math.exp(-decay * h)
-    c, s = math.cos(turning * h), math.sin(turning * h) / turning
-    return (
-        fade * (q * c + (r + decay * q) * s),
-        fade * (r * c - (decay * r + omega * omega * q) * s),
-    )
+    c, s = fade * math.cos(turning * h), fade * math.sin(turning * h) / turning
+    return c + decay * s, s, -omega * omega * s, c - decay * s
 
 
 @effect_kernel
 def resonance(p: Floats, s: Floats, w: Floats) -> None:
     """p: frequency (Hz), damping (1), mass ratio (1); s: deflection (m) and speed (m/s) of the second mass.
 
-    The deflection is counted from the first mass, the speed from the ground.
+    The deflection is counted from the first mass, the speed from the ground. s[2:]: a step (s), and what one
+    as long makes of them, which costs more than all else.
     """
     omega = 2.0 * math.pi * p[0]
     mass = p[2] * w[MASS]
     w[MASS] -= mass
     h = w[STEP]
     if h > 0.0:
+        if abs(h - s[2]) > SAME * h:
+            s[2] = h
+            s[3], s[4], s[5], s[6] = swinging(omega, p[1], h)
         base = w[MOVED] / h
-        q, r = swing(s[0], s[1] - base, omega, p[1], h)
-        s[0], s[1] = q, r + base
+        q, r = s[0], s[1] - base
+        s[0], s[1] = s[3] * q + s[4] * r, s[5] * q + s[6] * r + base
     else:
         s[0] -= w[MOVED]
     w[PUSH] += mass * (omega * omega * s[0] + 2.0 * p[1] * omega * (s[1] - w[VELOCITY]))
@@ -148,7 +158,7 @@ class Resonance(Effect):
     search_grid = {"damping": (0.01, 0.05, 0.2), "mass_ratio": (0.1, 0.4)}
     moving_mass = True
     order = 20
-    states = 2
+    states = 7
 
     def frequency(self) -> float:
         """Return the larger of the frequency of both masses and that of its damping on the first (rad/s)."""

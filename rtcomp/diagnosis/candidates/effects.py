@@ -6,7 +6,6 @@ parameter has no unit, it states start values.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term, first_order
 from rtcomp.diagnosis.fitting.starting import within
 from rtcomp.diagnosis.forces.balance import BASE, ForceBalance
+from rtcomp.diagnosis.numerics.grids import Point, chessboard
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Parameter, catalogue
@@ -186,7 +186,7 @@ def _points(kind: type[Effect], scales: Scales, fitter: Fitter) -> Iterator[tupl
                 _phases(kind, base, fitter) if p.unit == ent.PHASE else scales.of_parameter(p, kind)
                 for p in moved
             ]
-            for values in itertools.product(*ranges):
+            for values in _grid(kind, moved, ranges):
                 yield {**base, **still, **dict(zip([p.name for p in moved], values, strict=True))}, linear
         for name in [] if fitter.linear(kind) else kind.linear:
             p = ent.parameter(kind, name)
@@ -196,6 +196,15 @@ def _points(kind: type[Effect], scales: Scales, fitter: Fitter) -> Iterator[tupl
             elif name in base and p.unit == "m" and ent.happens_once(kind):  # further than friction yields
                 jumps = fitter.balance.data.jumps
                 yield from (({**base, ent.MOMENT: j.time, name: j.size}, "") for j in jumps)
+
+
+def _grid(kind: type[Effect], moved: Sequence[Parameter], ranges: Sequence[Sequence[float]]) -> list[Point]:
+    """Return values of all parameters that are `moved`: every form with every second point of the others.
+
+    Of one with several values all are taken: a fit begins from the nearest.
+    """
+    one_of = [i for i, p in enumerate(moved) if len(ranges[i]) > 1 and not ent.is_form(kind, p)]
+    return chessboard(ranges, thinned=one_of if len(one_of) > 1 else [])
 
 
 def _searched(kind: type[Effect], p: Parameter) -> bool:

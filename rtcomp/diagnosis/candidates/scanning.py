@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.numerics.grids import chessboard
 from rtcomp.diagnosis.settings import LEAST_GAIN
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
@@ -56,7 +56,8 @@ def scanned(fitter: Fitter, model: Fitted, term: Term, ends: float) -> list[Term
     without = some.quick(model.terms)
     swings = math.sqrt(max(float(model.weights.sum()), 0.0) / fitter.balance.stage.mass) / (2.0 * math.pi)
     grids = [[swings * FASTER**k for k in STIFFER] if p.unit == "Hz" else _within(p) for p in stated]
-    points = chessboard([*grids, _lengths(fitter)])
+    grids.append(_lengths(fitter))
+    points = chessboard(grids, range(len(grids)))
     tried = shared(lambda point: from_afar({**defaults, **dict(zip(names, point, strict=True))}), points)
     if not min(tried) < (1.0 - LEAST_GAIN) ** 2 * few.quick(model.terms):
         return []  # nor near any of them, or too little to matter
@@ -90,12 +91,6 @@ def _least(
     simplex = np.vstack([at, at + FIRST * np.eye(at.size)])
     done = minimize(left_at, at, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": TRIES})
     return float(done.fun), dict(zip(names, np.exp(done.x).tolist(), strict=True))
-
-
-def chessboard(grids: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
-    """Return every second point of a grid: of each that is left out all neighbours are there."""
-    places = itertools.product(*(range(len(grid)) for grid in grids))
-    return [tuple(g[i] for g, i in zip(grids, at, strict=True)) for at in places if sum(at) % 2 == 0]
 
 
 def _within(p: Parameter) -> list[float]:

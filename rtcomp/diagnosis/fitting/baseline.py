@@ -30,8 +30,8 @@ SPEEDS = 9
 """Speeds below which micro-damping may act, where the belief has none."""
 STEPS = 4
 """Times that a believed speed is moved to where a fit has it, at most."""
-SETTLED_SPEED = 2e-3
-"""Relative change of that speed at which it is settled."""
+FOUND_SPEED, SETTLED_SPEED = 0.03, 2e-3
+"""How well that speed is looked for (logarithm); the change of it at which fits have settled it."""
 FINER = 3
 """Times finer they stand around those found, in the second try."""
 SMOOTHED = (1.0, 0.1, 0.01)
@@ -114,7 +114,7 @@ def _search_speed(fitter: Fitter, terms: Sequence[Term]) -> None:
     tried = np.linspace(slow, fast, SPEEDS)
     at = int(np.argmin([left(one) for one in tried.tolist()]))
     near = (tried[max(at - 1, 0)], tried[min(at + 1, SPEEDS - 1)])
-    best = minimize_scalar(left, bounds=near, method="bounded", options={"xatol": SETTLED_SPEED})
+    best = minimize_scalar(left, bounds=near, method="bounded", options={"xatol": FOUND_SPEED})
     balance.damp_below(float(np.exp(best.x)))
 
 

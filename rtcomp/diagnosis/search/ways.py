@@ -53,18 +53,19 @@ def doubted(
 ) -> bool:
     """Tell whether a model (beside the baseline `base`) does worse than its effects by the other way.
 
-    `blocks` are those on which either way is measured; the `other` is left as it is.
+    `blocks` are those on which either way is measured; the `other` is left as it is. By what law friction
+    yields is the axis's own, whichever way its command is taken.
     """
     own, first = (Left.by(fitter, one, blocks[0]) for one in (model, base))
     there = other.on(other.balance.data)
-    there.offset = fitter.offset
+    there.offset, there.balance.exponent = fitter.offset, fitter.balance.exponent
     same, fewer = (least_left(there, some, blocks[1], ends) for some in (model.terms, model.terms[:-1]))
     return outdone(first, own, same, fewer)
 
 
 def least_left(fitter: Fitter, terms: Sequence[Term], blocks: np.ndarray, ends: float) -> Left:
     """Return what effects leave, the last of them in the form that suits this way."""
-    settle(fitter, terms, ends)
+    settle(fitter, terms, ends, law=False)
     same = fitter.fit(terms)
     forms = in_better_form(fitter, [same], ends) if terms else []
     models = [same, *(fitter.fit([*terms[:-1], form], same) for form in forms)]

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from recorded import STAGE, run, stage, there_and_back
 
 from rtcomp.diagnosis import clock
 from rtcomp.diagnosis.candidates.excerpt import excerpt, moving
 from rtcomp.diagnosis.candidates.growing import grow
-from rtcomp.diagnosis.candidates.scanning import chessboard, scanned
+from rtcomp.diagnosis.candidates.scanning import scanned
 from rtcomp.diagnosis.fitting.baseline import baseline
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.free import Term
@@ -25,17 +22,6 @@ from rtcomp.diagnosis.search.selection import look
 from rtcomp.stage.stage import Stage
 
 PLAY = {"name": "backlash", "gap": 4e-6, "share": 0.35, "contact": 90.0}
-
-
-@given(st.lists(st.integers(1, 5), min_size=1, max_size=3))
-def test_every_point_of_a_grid_is_looked_at_or_all_its_neighbours_are(sizes: list[int]) -> None:
-    found = set(chessboard([[float(i) for i in range(size)] for size in sizes]))
-    for point in itertools.product(*(range(size) for size in sizes)):
-        steps = [np.eye(len(sizes), dtype=int)[i] * way for i in range(len(sizes)) for way in (-1, 1)]
-        beside = [tuple(np.add(point, step)) for step in steps]
-        inside = [at for at in beside if all(0 <= k < n for k, n in zip(at, sizes, strict=True))]
-        assert point in found or found.issuperset(inside)
-    assert len(found) == (math.prod(sizes) + 1) // 2
 
 
 @pytest.mark.parametrize("gap", [8e-7, 4e-6])
