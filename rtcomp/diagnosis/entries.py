@@ -63,6 +63,16 @@ def goes_by_friction(kind: type[Effect]) -> bool:
     return bool(_by_friction(cast(Hashable, kind)))
 
 
+def changes_speed(kind: type[Effect]) -> bool:
+    """Tell whether an effect changes the speed that viscous friction goes by."""
+    return bool(_changes_speed(cast(Hashable, kind)))
+
+
+@cache
+def _changes_speed(kind: Any) -> bool:
+    return bool(np.any(_changes(kind.from_dict(kind.example))[:, [wires.LATE, wires.SKEW]]))
+
+
 @cache
 def _adds_force(kind: Any) -> bool:
     if kind.place is Place.SENSOR or not kind.linear:

@@ -22,6 +22,7 @@ from rtcomp.diagnosis.forces.bank import AS_IT_IS
 from rtcomp.diagnosis.forces.blocks import cut
 from rtcomp.diagnosis.forces.kinematics import acted
 from rtcomp.diagnosis.forces.noise import Noise, Whitening
+from rtcomp.diagnosis.forces.play import carried_by
 from rtcomp.diagnosis.forces.reaches import MOST_OWN, joined
 from rtcomp.diagnosis.forces.sides import exact
 from rtcomp.diagnosis.forces.signals import BASE, Signals
@@ -78,8 +79,7 @@ class ForceBalance(Signals):
     def put(self, reaches: Floats, step: float) -> None:
         """Put the grid of yield displacements (m) to `reaches`, in steps of `step` (logarithm)."""
         own = self.believed_reaches if self.believed_reaches.size <= MOST_OWN else np.zeros(0)
-        self.reaches = joined(own, np.unique(reaches), step)
-        self.step = step
+        self.reaches, self.step = joined(own, np.unique(reaches), step), step
         self._cache = Cache()
 
     def on(self, data: Data, block: np.ndarray | None = None) -> ForceBalance:
@@ -114,7 +114,8 @@ class ForceBalance(Signals):
         """Return the force (N, (K,)) that a segment's motion needs, of coefficients `c` of the belief."""
         path = self._path(segment, [], smooth=False)
         units = self._units(segment, path, self._start(segment, []), [], [], None)
-        force = path.measured * c[0] + units @ c[1 : self.friction.stop]
+        damped = c[1] * self._viscous(segment, path, []) + self._micro(segment, path) @ c[2 : len(BASE) + 1]
+        force = path.measured * c[0] + damped + units @ c[self.model.start : self.friction.stop]
         made = [ent.build(one) for e in self.believed for one in ent.basis(e)]
         for effect, size in zip(made, c[self.size :], strict=True):
             force += size * self.force_of(effect, segment, path)
@@ -142,14 +143,13 @@ class ForceBalance(Signals):
         Raises ConfigError where a parameter is out of its bounds.
         """
         drive, base, added, by_load = self._groups(entries, weights)
-        y = self._whitened(drive)[0]
-        rows, spans = [self._whitened(g) for g in base], []
+        y, spans = self._whitened(drive)[0], []
+        rows = [self._whitened(g) for g in base]
         at = sum(r.shape[0] for r in rows)
         for groups in added:
-            found = [self._whitened(g) for g in groups]
-            rows += found
-            spans.append(slice(at, at + len(found)))
-            at += len(found)
+            rows += [self._whitened(g) for g in groups]
+            spans.append(slice(at, at + len(groups)))
+            at += len(groups)
         columns = np.concatenate(rows)
         scale = self._scale(y, by_load)
         return System(scale * y, scale * columns if scale != 1.0 else columns, tuple(spans))
@@ -199,8 +199,8 @@ class ForceBalance(Signals):
     def forces_of(self, entries: Sequence[Entry]) -> Floats:
         """Return the columns (p, n) of the last of `entries`, which adds a force; they are not kept."""
         drive, _, added, by_load = self._groups(entries, None)
-        rows = np.concatenate([self.compared(g.make()) for g in added[-1]])
-        return np.asarray(self._scale(self._whitened(drive)[0], by_load) * rows)
+        scale = self._scale(self._whitened(drive)[0], by_load)
+        return np.asarray(scale * np.concatenate([self.compared(g.make()) for g in added[-1]]))
 
     def _scale(self, y: Floats, by_load: Group | None) -> float:
         """Return what makes up for a residual that depends less on the command than that of the belief.
@@ -227,7 +227,7 @@ class ForceBalance(Signals):
         bodies = [e for e in work if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
         forces_added = [ent.build(e) for e, adds in zip(everything, adding, strict=True) if adds]
         side = self._side(drive, sensors)
-        load = self._carried(bodies, forces_added, weights)
+        load = carried_by(bodies, forces_added, self.weights if weights is None else weights)
         base, by_load = self._base(drive, sensors, modifiers, bodies, forces_added, load, weights, larger)
         added = [
             [self._added(made, sensors, load) for made in ent.basis(e)] if adds else []
@@ -247,9 +247,9 @@ class ForceBalance(Signals):
 
     def _side(self, drive: Sequence[Effect], sensors: Sequence[Effect]) -> Group:
         """Return the drive side; where nothing of it goes by the motion, that of the believed sensor."""
-        fixed = [e for e in self._fixed if e.place is Place.SENSOR]
         own = [e for e in self.stage.chain if e.place is Place.DRIVE]
-        at = fixed if all(e.command_only for e in [*own, *drive]) else sensors
+        fixed = all(e.command_only for e in [*own, *drive])
+        at = [e for e in self._fixed if e.place is Place.SENSOR] if fixed else sensors
         return Group(("y", key_of(drive), key_of(at)), lambda: self._drive_side(drive, at))
 
     def _plain_drive(self) -> Floats:

@@ -1,10 +1,9 @@
-"""Friction as columns: what each unit of the base does along a motion, with what changes friction at work.
+"""Friction as columns: what each unit of it does along a motion, with what changes friction at work.
 
-Units are viscous friction and micro-damping of size 1, the derivative of that by the logarithm of its speed,
-the model of friction that is believed, where that is not of stop elements, and a stop element of 1 N/m for
-each reach. All go along the motion in one pass, the elements by the law of
-the catalogue's and not by a call of it for each. What depends on the whole of friction (its level, how far it
-is along its branch) is given that of the friction at hand, of which the units are parts: it stays linear.
+Units are the model of friction that is believed, where that is not of stop elements, and a stop element of
+1 N/m for each reach. All go along the motion in one pass, the elements by the law of the catalogue's and not
+by a call of it for each. What depends on the whole of friction (its level, how far it is along its branch) is
+given that of the friction at hand, of which the units are parts: it stays linear.
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ from rtcomp.physics.closing import ClosingBranches
 from rtcomp.physics.maxwell_slip import MaxwellSlip
 from rtcomp.physics.program import Program, renew, run_chain
 from rtcomp.physics.softening import softened
-from rtcomp.physics.speed import MicroDamping, ViscousFriction
 from rtcomp.physics.wires import (
     COUNT,
     FRICTION,
@@ -35,15 +33,13 @@ from rtcomp.physics.wires import (
     SOFTENS,
 )
 from rtcomp.physics.yielding import stretched, without_noise, yielded
-from rtcomp.stage.balance import along_row, around_rows, parts_of
+from rtcomp.stage.balance import along_row, parts_of
 from rtcomp.stage.stage import Stage
 
 AS_IT_IS = (1.0, 1.0)
 """Times its stiffness and its level, for what asks for the whole of friction."""
-SPEED_UNITS = 3
-"""First units: viscous friction, micro-damping, its derivative."""
-FASTER = 0.02
-"""Relative change of the speed of micro-damping to which its damping is looked at."""
+PARTS = 2
+"""Parts of a row at least: where friction turns within one, the force at its ends is not that between."""
 
 
 def units_along(
@@ -55,28 +51,20 @@ def units_along(
     motion: Floats,
     grain: float,
     start: Floats | None = None,
-    least_parts: int = 1,
     sizes: Floats | None = None,
     larger: tuple[float, float] = AS_IT_IS,
     exponent: float = 0.0,
 ) -> Floats:
-    """Return the force (N) of each unit around the rows of a motion, (K, 3 + models + reaches).
+    """Return the force (N) of each unit around the rows of a motion, (K, models + reaches).
 
-    With `sizes` of the stop elements, (reaches,), their sum times these instead of them: (K, 4 + models).
+    With `sizes` of the stop elements, (reaches,), their sum times these instead of them: (K, models + 1).
 
     `motion` is (K, 5): time (s), position (m), velocity, acceleration, the command held up to each row (V);
     `weights` (N/m) of the elements make the friction at hand; what asks for the whole of it finds its
     stiffness and its level so many times `larger`. `start` (m) are the deflections of the elements before
-    the motion, nothing where it is not given. `drive` effects only tell the load. A row is cut into
-    `least_parts`, or more where an effect needs it. Elements yield by Dahl's law of an `exponent`: 0, at
-    their reach at once.
+    the motion, nothing where it is not given. `drive` effects only tell the load. A row is cut into PARTS,
+    or more where an effect needs it. Elements yield by Dahl's law of an `exponent`, of 0 at once.
     """
-    below = stage.mechanics.micro_damping_speed
-    units: list[Effect] = [
-        ViscousFriction(coefficient=1.0),
-        MicroDamping(coefficient=1.0, speed=below),
-        MicroDamping(coefficient=1.0, speed=(1.0 + FASTER) * below),
-    ]
     own = own_models(stage)
     models = MaxwellSlip.order
     chain = sorted(modifiers, key=lambda e: e.order)
@@ -86,30 +74,21 @@ def units_along(
     # One for the whole, and one for each element (or for their sum): the whole with a little more of that.
     bent = [e for e in bending for _ in range(1 + (len(reaches) if sizes is None else 1))]
     after = [e for e in after if e.name != ClosingBranches.name]
-    program = Program([*before, *units, *own, *bent, *after])
+    program = Program([*before, *own, *bent, *after])
     row = float((motion[-1, 0] - motion[0, 0]) / max(motion.shape[0] - 1, 1))
-    needed = parts_of([*before, *after], row)
-    parts = max(needed, least_parts)
+    parts = max(parts_of([*before, *after], row), PARTS)
     times = weights if sizes is None else sizes
-    columns = SPEED_UNITS + len(own) + (len(reaches) if sizes is None else 1)
-    out = np.empty((motion.shape[0], columns if parts == 1 else SPEED_UNITS))
-    mean = np.zeros((motion.shape[0] if parts > 1 else 1, columns))
+    mean = np.zeros((motion.shape[0], len(own) + (len(reaches) if sizes is None else 1)))
     w = np.zeros(COUNT)
     w[GRAIN] = grain
     base = np.array([stage.mass, stage.force_constant])
     deflection = np.zeros(len(reaches)) if start is None else start.copy()
-    smooth = parts > needed == 1  # damping is, between rows
     whole = bool(bent or after) or any(e.whole_friction for e in before)
     _along(
-        program.steps, program.p, program.s, w, base, motion, parts, smooth, whole, len(before), len(own),
-        len(bent),
-        *larger, weights, reaches, exponent, deflection, sizes is not None, times, out, mean,
+        program.steps, program.p, program.s, w, base, motion, parts, whole, len(before), len(own), len(bent),
+        *larger, weights, reaches, exponent, deflection, sizes is not None, times, mean,
     )  # fmt: skip
-    found = around_rows(out) if parts == 1 else mean
-    if smooth:
-        found[:, :SPEED_UNITS] = around_rows(out)
-    found[:, 2] = (found[:, 2] - found[:, 1]) / np.log1p(FASTER)
-    return found
+    return mean
 
 
 @compiled
@@ -133,7 +112,6 @@ def _along(
     base: Floats,
     motion: Floats,
     parts: int,
-    smooth: bool,
     whole: bool,
     first: int,
     own: int,
@@ -146,23 +124,19 @@ def _along(
     deflection: Floats,
     summed: bool,
     times: Floats,
-    out: Floats,
     mean: Floats,
 ) -> None:
-    """Fill `out` with forces at the rows: units of speed are the effects from `first` on.
+    """Fill `mean` with forces around the rows: of `own` models of friction, the effects from `first` on.
 
-    After them come `own` models of friction and what each element holds, or so many `times`, `summed` up.
+    After them comes what each element holds, or so many `times`, `summed` up. Means over `parts` of the row
+    before each row are weighed by what has passed of that, those over the row after it by what is to come.
 
-    Where rows are cut into `parts`, fill `mean` with their means around each row instead: over the row before
-    it weighed by what has passed of that, and over the row after it by what is to come. Units of speed that
-    are `smooth` between rows are at the ends of rows, in `out`.
-
-    Where nothing changes or asks for the `whole` of friction, it is not summed up. After the units of speed
-    come `bent` effects that bend branches. What else changes the whole of friction is shared out among the
+    Where nothing changes or asks for the `whole` of friction, it is not summed up. After the models come
+    `bent` effects that bend branches. What else changes the whole of friction is shared out among the
     elements in proportion to what each holds.
     """
     count = weights.size
-    then = first + SPEED_UNITS + own
+    then = first + own
     level = stiffness = its_level = its_stiffness = 0.0
     for i in range(count):
         level += weights[i] * reaches[i]
@@ -176,19 +150,13 @@ def _along(
             renew(w, base[0], base[1])
             w[GRIP_LEVEL], w[GRIP_STIFFNESS] = higher * level + its_level, stiffness + its_stiffness
             run_chain(steps, p, s, w, 0, first)
-            if j == parts or not smooth:
-                for i in range(SPEED_UNITS):
-                    w[FRICTION] = 0.0
-                    run_chain(steps, p, s, w, first + i, first + i + 1)
-                    here[i] = w[FRICTION]
-            believed, its_level, its_stiffness = _believed(steps, p, s, w, first + SPEED_UNITS, own)
+            believed, its_level, its_stiffness = _believed(steps, p, s, w, first, own)
             if parts == 2 and not whole and not summed and w[SOFTENS] == exponent == 0.0:
                 # Nothing asks what an element holds or changes it: it goes straight to the means.
-                stops, third = SPEED_UNITS + own, w[SCALE] / 3.0
                 if own > 0:
-                    here[SPEED_UNITS] = believed
-                _share_out(mean, here[:stops], last, k, j, parts)
-                _move_and_share(w[MOVED], w[REACH], third, reaches, deflection, mean, stops, k, j)
+                    here[0] = believed
+                _share_out(mean, here[:own], last, k, j, parts)
+                _move_and_share(w[MOVED], w[REACH], w[SCALE] / 3.0, reaches, deflection, mean, own, k, j)
                 continue
             asked = 0.0
             if summed and w[SOFTENS] == exponent == 0.0:  # nobody asks what each element holds
@@ -211,10 +179,7 @@ def _along(
                     bend(steps, p, s, w, then, total, level, weights, reaches, held)
                 grown = _grown(steps, p, s, w, then + bent)
             _put(here, own, grown, believed, summed, asked, held)
-            if parts > 1:
-                _share_out(mean, here, last, k, j, parts)
-        for i in range(out.shape[1]):
-            out[k, i] = here[i]
+            _share_out(mean, here, last, k, j, parts)
 
 
 @compiled
@@ -233,15 +198,14 @@ def _believed(
 def _put(
     here: Floats, own: int, grown: float, believed: float, summed: bool, asked: float, held: Floats
 ) -> None:
-    """Put what friction holds behind the units of speed, `grown` times as large."""
-    stops = SPEED_UNITS + own
+    """Put what friction holds, `grown` times as large."""
     if own > 0:
-        here[SPEED_UNITS] = grown * believed
+        here[0] = grown * believed
     if summed:
-        here[stops] = grown * asked
+        here[own] = grown * asked
         return
     for i in range(held.size):
-        here[stops + i] = grown * held[i]
+        here[own + i] = grown * held[i]
 
 
 @summing

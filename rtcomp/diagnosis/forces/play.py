@@ -10,7 +10,7 @@ import numpy as np
 
 from rtcomp.diagnosis.cache import key_of
 from rtcomp.kernels import Floats, compiled
-from rtcomp.physics import Effect, wires
+from rtcomp.physics import Effect, Place, wires
 from rtcomp.physics.coupled import contact
 from rtcomp.physics.program import COUNT, Program, run_chain
 from rtcomp.physics.yielding import yielded
@@ -46,6 +46,23 @@ class Carried:
     def key(self) -> Hashable:
         """What tells it from others."""
         return key_of([self.play]), self.weights.tobytes(), key_of(self.pushes)
+
+
+def carried_by(bodies: Sequence[Effect], adding: Sequence[Effect], held: Floats) -> Carried | None:
+    """Return what is behind a play of `bodies`, friction of stiffnesses `held` (N/m); None without a play.
+
+    `adding` are effects that add a force.
+    """
+    play = next((e for e in bodies if e.behind and _active(e)), None)
+    pushes = [e for e in adding if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
+    pushes += [e for e in bodies if not e.behind and not e.moving_mass]
+    return Carried(play, held, tuple(pushes)) if play is not None else None
+
+
+def _active(effect: Effect) -> bool:
+    """Tell whether an effect is away from the values at which it changes nothing."""
+    neutral = effect.neutral or {}
+    return not neutral or any(effect.values[name] != value for name, value in neutral.items())
 
 
 def behind_play(

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtcomp.diagnosis.forces.bank import SPEED_UNITS, units_along
+from rtcomp.diagnosis.forces.bank import units_along
 from rtcomp.diagnosis.forces.noise import Noise
 from rtcomp.diagnosis.numerics.spectrum import filtered
 from rtcomp.diagnosis.recordings.data import load_data
@@ -177,8 +177,7 @@ def mass_asked_for(stage: Stage, recording: Recording) -> Mass:
         motion = np.ascontiguousarray(np.column_stack([s.time, x, v, a, held]))
         units = units_along(stage, [], [], reaches, np.zeros(STOPS), motion, 0.0)
         mean = 0.5 * (held + np.append(held[1:], held[-1:])) * stage.force_constant
-        friction = [units[:, :1], units[:, SPEED_UNITS:]]
-        table = np.column_stack([a, *friction, around_rows(x), np.ones(x.size), mean])
+        table = np.column_stack([a, around_rows(v), units, around_rows(x), np.ones(x.size), mean])
         low_passed = filtered(np.ascontiguousarray(table.T), data.rate, noise.wiener, noisy=True)
         edge = min(100, x.size // 10)
         columns.append(low_passed[:-1, edge:-edge])

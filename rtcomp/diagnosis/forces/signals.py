@@ -6,7 +6,7 @@ friction, drive, sensor or mass are at work while the other columns are made.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.cache import Cache, Group, key_of
 from rtcomp.diagnosis.entries import Entry
-from rtcomp.diagnosis.forces.bank import AS_IT_IS, SPEED_UNITS, deflections, units_along
+from rtcomp.diagnosis.forces.bank import AS_IT_IS, deflections, units_along
 from rtcomp.diagnosis.forces.kinematics import Path, acted, second_difference
 from rtcomp.diagnosis.forces.led import led_there, way_there
 from rtcomp.diagnosis.forces.models import levels
@@ -26,6 +26,7 @@ from rtcomp.diagnosis.numerics.spectrum import filtered
 from rtcomp.diagnosis.recordings.data import Data, Segment, behind_reading
 from rtcomp.kernels import Floats
 from rtcomp.physics import Effect, Place, catalogue
+from rtcomp.physics.speed import MicroDamping, ViscousFriction
 from rtcomp.stage.balance import around_rows, forces, parts_of_drive
 from rtcomp.stage.stage import Stage
 
@@ -34,8 +35,8 @@ BASE = ("mass", "viscous", "micro_damping")
 those of a believed model of friction, of the friction units, and a constant force."""
 FURTHEST = 0.3
 """Largest change of its logarithm that is taken from one fit."""
-PARTS = 2
-"""Parts of a row for friction: where it turns within one, the force at its ends is not that between."""
+FASTER = 0.02
+"""Relative change of the speed of micro-damping to which its damping is looked at."""
 GRAINS = 1.5
 """Motion there and back that is noise, in times the noise (rms) that smoothing leaves."""
 MORE = 1e-3
@@ -131,11 +132,24 @@ class Signals:
         """Take `speed` (m/s) as that below which micro-damping acts."""
         self.stage = self.stage.with_changes(stage={"micro_damping_speed": speed})
 
-    def force_of(self, effect: Effect, segment: Segment, path: Path) -> Floats:
-        """Return the force (N, (K,)) that the motion needs for an effect that adds one."""
-        given = self.given(segment)
-        f = forces(self.stage, [effect], segment.time, path.x, path.v, path.a, given, self.grain)
+    def force_of(self, effect: Effect, segment: Segment, path: Path, before: Sequence[Effect] = ()) -> Floats:
+        """Return the force (N, (K,)) that the motion needs for an effect that adds one, some `before` it."""
+        chain, given = [*before, effect], self.given(segment)
+        f = forces(self.stage, chain, segment.time, path.x, path.v, path.a, given, self.grain)
         return np.asarray(-f.others() - around_rows(f.drive))
+
+    def _viscous(self, segment: Segment, path: Path, modifiers: Sequence[Effect]) -> Floats:
+        """Return the force (N, (K,)) of viscous friction of size 1, `modifiers` at work on its speed."""
+        return self.force_of(ViscousFriction(coefficient=1.0), segment, path, modifiers)
+
+    def _micro(self, segment: Segment, path: Path) -> Floats:
+        """Return the force (N, (K, 2)) of micro-damping of size 1, and its derivative by its log speed."""
+        speed = self.stage.mechanics.micro_damping_speed
+        here, faster = (
+            self.force_of(MicroDamping(coefficient=1.0, speed=each), segment, path)
+            for each in (speed, (1.0 + FASTER) * speed)
+        )
+        return np.column_stack([here, (faster - here) / np.log1p(FASTER)])
 
     def paths(self, sensors: Sequence[Effect] = ()) -> list[Path]:
         """Return the motion of every segment, what `sensors` did to the reading undone."""
@@ -183,7 +197,7 @@ class Signals:
         weights: Floats | None,
         larger: tuple[float, float],
     ) -> tuple[list[Group], Group | None]:
-        """Return the base's columns (mass; units of damping and friction; a constant force), the load's.
+        """Return the base's columns (mass; damping; units of friction; a constant force), the load's.
 
         The last is how much the friction at hand changes with the command, relative to it.
         """
@@ -216,18 +230,18 @@ class Signals:
                 found.append(a)
             return found
 
+        def along(made: Callable[[Segment, Path], Floats]) -> list[Floats]:
+            return [made(s, path) for s, path in zip(self.data.segments, driven(), strict=True)]
+
         def units(
             more: float = 0.0, some: np.ndarray | None = None, times: Floats | None = None
         ) -> list[Floats]:
-            found = []
-            for s, path in zip(self.data.segments, driven(), strict=True):
+            def one(s: Segment, path: Path) -> Floats:
                 pushed = replace(s, voltage=(1.0 + more) * s.voltage) if more else s
-                at_hand = weights if whole else None
-                start = self._start(s, sensors)
-                found.append(
-                    self._units(pushed, path, start, before, modifiers, at_hand, some, times, larger)
-                )
-            return found
+                start, at_hand = self._start(s, sensors), weights if whole else None
+                return self._units(pushed, path, start, before, modifiers, at_hand, some, times, larger)
+
+            return along(one)
 
         def of_sizes(sizes: Floats) -> list[Floats]:
             some = sizes[stops:] != 0.0
@@ -239,15 +253,18 @@ class Signals:
         def by_load() -> list[Floats]:
             some = held != 0.0
             pairs = zip(units(MORE, some, held), units(0.0, some, held), strict=True)
-            return [(more - plain)[:, SPEED_UNITS:].sum(axis=1) / MORE for more, plain in pairs]
+            return [(more - plain).sum(axis=1) / MORE for more, plain in pairs]
 
-        stops = SPEED_UNITS + self.models.size
+        stops = self.models.size
         held = self.weights if weights is None else weights
-        speed = self.stage.mechanics.micro_damping_speed
-        key = (key_of(before), key_of(modifiers), key_of(sensors), behind, own)
+        at, speed = (key_of(sensors), behind), self.stage.mechanics.micro_damping_speed
+        key = (key_of(before), key_of(modifiers), *at, own)
+        turned = sorted((e for e in modifiers if ent.changes_speed(type(e))), key=lambda e: e.order)
         columns = [
-            Group(("mass", key_of(others), key_of(sensors), behind), mass),
-            Group(("units", speed, *key), units, of_sizes, stops + self.reaches.size),
+            Group(("mass", key_of(others), *at), mass),
+            Group(("viscous", key_of(turned), *at), lambda: along(lambda s, p: self._viscous(s, p, turned))),
+            Group(("micro", speed, *at), lambda: along(self._micro)),
+            Group(("units", *key), units, of_sizes, stops + self.reaches.size),
             Group(("offset",), lambda: [np.ones(s.time.size) for s in self.data.segments]),
         ]
         return columns, Group(("by load", held.tobytes(), *key), by_load) if before else None
@@ -289,10 +306,9 @@ class Signals:
         times: Floats | None = None,
         larger: tuple[float, float] = AS_IT_IS,
     ) -> Floats:
-        """Return the force (N, (K, p)) around the rows of damping and of friction units, all or `some`.
+        """Return the force (N, (K, p)) around rows of friction units, all or `some`, or their sum by `times`.
 
-        `start` (m) are deflections of all units before the motion. With so many `times` each, their sum
-        instead of them.
+        `start` (m) are deflections of all units before the motion.
         """
         motion = np.column_stack([segment.time, path.x, path.v, path.a, self.given(segment)])
         held, reaches = self.weights if weights is None else weights, self.reaches
@@ -301,7 +317,7 @@ class Signals:
             times = times[some] if times is not None else None
         return units_along(
             self.stage, list(before), list(modifiers), reaches, held, np.ascontiguousarray(motion),
-            self.grain, start, PARTS, times, larger, self.exponent,
+            self.grain, start, times, larger, self.exponent,
         )  # fmt: skip
 
     def _start(self, segment: Segment, sensors: Sequence[Effect]) -> Floats:
@@ -328,22 +344,6 @@ class Signals:
             return [self.force_of(effect, s, p) for s, p in pairs]
 
         return Group(("added", key_of([effect]), key_of(sensors), load.key if load is not None else ()), made)
-
-    def _carried(
-        self, bodies: Sequence[Effect], adding: Sequence[Effect], weights: Floats | None
-    ) -> Carried | None:
-        """Return what is behind a play of `bodies`, None where there is none."""
-        play = next((e for e in bodies if e.behind and _active(e)), None)
-        pushes = [e for e in adding if e.place in (Place.MECHANICS, Place.DISTURBANCE)]
-        pushes += [e for e in bodies if not e.behind and not e.moving_mass]
-        held = self.weights if weights is None else weights
-        return Carried(play, held, tuple(pushes)) if play is not None else None
-
-
-def _active(effect: Effect) -> bool:
-    """Tell whether an effect is away from the values at which it changes nothing."""
-    neutral = effect.neutral or {}
-    return not neutral or any(effect.values[name] != value for name, value in neutral.items())
 
 
 def _all(frequency: Floats) -> Floats:
