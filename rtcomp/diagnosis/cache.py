@@ -59,8 +59,14 @@ class Group:
     make: Callable[[], list[Floats]]
     times: Callable[[Floats], list[Floats]] | None = None
     """The sum of all columns times so many sizes, (K,) for each segment, where that is less work."""
-    width: int = 0
-    """Columns, where `times` is given."""
+    width: int = 1
+    """Columns."""
+
+    def summed(self, sizes: Floats) -> list[Floats]:
+        """Return the sum of the columns times `sizes`, (width,): (K,) for each segment."""
+        if self.times is not None:
+            return self.times(sizes)
+        return [m * sizes[0] if m.ndim == 1 else m @ sizes for m in self.make()]
 
 
 def key_of(effects: Sequence[Effect]) -> Hashable:

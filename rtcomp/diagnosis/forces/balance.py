@@ -178,19 +178,15 @@ class ForceBalance(Signals):
         pending: list[Floats] | None = None
         at = 0
         for group in [*base, *(g for groups in added for g in groups)]:
+            sizes = c[at : at + group.width]
+            at += group.width
+            if not sizes.any():
+                continue
             kept = self._cache.get(group.key)
             if kept is not None:
-                out -= c[at : at + kept[0].shape[0]] @ kept[0]
-                at += kept[0].shape[0]
+                out -= sizes @ kept[0]
                 continue
-            if group.times is not None:
-                sizes = c[at : at + group.width]
-                signals = group.times(sizes)
-            else:
-                made = group.make()
-                sizes = c[at : at + (1 if made[0].ndim == 1 else made[0].shape[1])]
-                signals = [m * sizes[0] if m.ndim == 1 else m @ sizes for m in made]
-            at += sizes.size
+            signals = group.summed(sizes)
             pending = signals if pending is None else [p + q for p, q in zip(pending, signals, strict=True)]
         if pending is not None:
             out -= self.compared(pending)[0]

@@ -67,8 +67,7 @@ class Signals:
         m = stage.mechanics
         self.believed_speed = m.micro_damping_speed if m.micro_damping > 0.0 else None
         """Speed (m/s) below which micro-damping is believed to act, None where there is no such belief."""
-        self.speed_room = 0.0
-        """N s/m, up to which the column of that speed goes where none is believed: first order ends there."""
+        self.speed_room = 0.0  # N s/m, up to which its column goes where none is believed: first order ends
 
     @property
     def believed_reaches(self) -> Floats:
@@ -114,10 +113,11 @@ class Signals:
 
     def smooth_for(self, part: float) -> None:
         """Smooth the position as if only `part` of its noise (power) were there."""
-        self.noise = self.noise.smoothing_for(part)
-        frequency = np.linspace(0.0, 0.5 * self.data.rate, 1000)
-        self.grain = GRAINS * self.noise.rms * float(np.sqrt(np.mean(self.noise.smoother(frequency) ** 2)))
-        self._cache = Cache()
+        before, self.noise = self.noise.smoother, self.noise.smoothing_for(part)
+        shares = self.noise.smoother(np.linspace(0.0, 0.5 * self.data.rate, 1000))
+        grain, self.grain = self.grain, GRAINS * self.noise.rms * float(np.sqrt(np.mean(shares**2)))
+        if (before, grain) != (self.noise.smoother, self.grain):
+            self._cache = Cache()
 
     def read_noise(self, stage: Stage) -> float:
         """Return the noise (m rms) of a recorded reading, of which rows may be means."""
@@ -263,7 +263,7 @@ class Signals:
         columns = [
             Group(("mass", key_of(others), *at), mass),
             Group(("viscous", key_of(turned), *at), lambda: along(lambda s, p: self._viscous(s, p, turned))),
-            Group(("micro", speed, *at), lambda: along(self._micro)),
+            Group(("micro", speed, *at), lambda: along(self._micro), width=2),
             Group(("units", *key), units, of_sizes, stops + self.reaches.size),
             Group(("offset",), lambda: [np.ones(s.time.size) for s in self.data.segments]),
         ]
