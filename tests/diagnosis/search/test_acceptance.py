@@ -21,7 +21,7 @@ STRIBECK = {"name": "stribeck", "rise": 0.4, "velocity": 1e-3}
 BY_LOAD = {"name": "load-dependent-friction", "form": "linear", "stiffening": 1.0}
 
 
-@pytest.mark.parametrize(("share", "coefficient"), [(0.5, 1.05), (0.9, 0.9)])
+@pytest.mark.parametrize(("share", "coefficient"), [(0.5, 1.05), (0.7, 0.95)])
 def test_a_drive_that_gives_nothing_and_friction_that_holds_the_rest_explain_nothing(
     share: float, coefficient: float
 ) -> None:
