@@ -268,6 +268,12 @@ def turns(entry: Mapping[str, Any]) -> bool:
     return PHASE in units and not units & {"m", "Hz"} and bool(entry.get(AMPLITUDE))
 
 
+def tone_of(entry: Mapping[str, Any]) -> float:
+    """Return the frequency (Hz) of an entry that is a wave in time, 0 for any other."""
+    units = {p.unit: p.name for p in kind_of(entry).parameters}
+    return float(entry[units["Hz"]]) if PHASE in units and "Hz" in units else 0.0
+
+
 def with_other_unit(unit: str, size: float) -> Entry:
     """Return the entry that puts another unit, true over believed of this `size`, in the place of a unit."""
     kind = next(kind for kind in catalogue.entries() if kind.other_unit == unit)

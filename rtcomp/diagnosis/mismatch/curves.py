@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.mismatch.locate import Axis
 from rtcomp.diagnosis.result import Place
@@ -31,9 +33,15 @@ class Curve(NamedTuple):
 
 
 def curve_of(looked: Sequence[Axis], entry: Entry, force: Floats, without: Floats) -> Curve:
-    """Return the curve of an `entry`: its `force` and what is left `without` it (N, (n,)) on an axis."""
-    waves = [a for a in looked if a.name == "position"] if "period" in entry else looked
-    return _along(waves, force, without, entry.get("period"))
+    """Return the curve of an `entry`: its `force` and what is left `without` it (N, (n,)) on an axis.
+
+    That of a tone goes along one of its periods.
+    """
+    waves = [a for a in looked if a.name == "position"] if ent.PERIOD in entry else looked
+    if (frequency := ent.tone_of(entry)) > 0.0:
+        time = next(a for a in looked if a.name == "time")
+        waves = [replace(time, name="time within a period", values=time.values % (1.0 / frequency))]
+    return _along(waves, force, without, entry.get(ent.PERIOD))
 
 
 def left_over(places: Sequence[Place]) -> Curve | None:

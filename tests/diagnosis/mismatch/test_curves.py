@@ -18,6 +18,7 @@ from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.result import Place
 
 COGGING = {"name": "cogging", "amplitude": 0.4, "period": 1e-4, "phase": 0.5}
+TONE = {"name": "tonal-disturbance", "amplitude": 0.3, "frequency": 17.0, "phase": 0.4}
 DEADBAND = {"name": "drive-deadband", "width": 0.2}
 UNEVEN = {"name": "position-dependent-friction", "amplitude": 0.3, "period": 2e-4, "phase": 0.0}
 
@@ -57,6 +58,15 @@ def test_what_changes_sign_with_the_motion_is_drawn_so() -> None:
     assert curve.axis == "position" and curve.signed
     wave = np.sin(2 * np.pi * curve.x / 2e-4)
     assert abs(np.corrcoef(curve.curve, wave)[0, 1]) > 0.8
+
+
+def test_a_tone_is_drawn_along_one_of_its_periods() -> None:
+    (curve,) = drawn([TONE])
+    assert curve is not None and curve.unit == "s"
+    assert curve.x.min() >= 0.0 and curve.x.max() <= 1.0 / 17.0
+    wave = 0.3 * np.sin(2 * np.pi * 17.0 * curve.x + 0.4)
+    assert abs(np.corrcoef(curve.curve, wave)[0, 1]) > 0.99
+    assert np.std(curve.data - curve.curve) < 0.15 * np.std(curve.curve)
 
 
 def test_an_effect_that_does_nothing_has_no_curve() -> None:
