@@ -21,7 +21,7 @@ from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term, first_order
 from rtcomp.diagnosis.fitting.starting import within
-from rtcomp.diagnosis.forces.balance import BASE, ForceBalance
+from rtcomp.diagnosis.forces.balance import BASE, NOTHING, ForceBalance
 from rtcomp.diagnosis.numerics.grids import Point, chessboard
 from rtcomp.errors import ConfigError
 from rtcomp.kernels import Floats
@@ -239,10 +239,11 @@ def _candidate(
             parts = ent.basis(entry)
             columns = fitter.units([*fitted.entries, entry])
             low, high = ent.bounds_of(entry)
-            return _finite(Candidate(Term.of(entry), tuple(parts), columns, low, high, True, linear))
+            return _seen(fitter, Candidate(Term.of(entry), tuple(parts), columns, low, high, True, linear))
         if not linear:
             change = fitter.change(fitted, entry)[None, :]
-            return _finite(Candidate(Term.of(entry), (entry,), change, np.zeros(1), np.full(1, np.inf)))
+            found = Candidate(Term.of(entry), (entry,), change, np.zeros(1), np.full(1, np.inf))
+            return _seen(fitter, found)
         p = ent.parameter(kind, linear)
         step, most = first_order(p, fitter.balance), ent.highest(entry, p)
         phases = [p.name for p in kind.parameters if p.unit == ent.PHASE]
@@ -262,7 +263,7 @@ def _candidate(
                 np.array([(most - entry[linear]) / step]),
             )
         columns = np.array([fitter.change(fitted, part) for part in parts])
-        return _finite(Candidate(term, tuple(parts), columns, low, high, looked=linear))
+        return _seen(fitter, Candidate(term, tuple(parts), columns, low, high, looked=linear))
     except ConfigError:
         return None
 
@@ -273,11 +274,11 @@ def on_other(candidate: Candidate, fitter: Fitter, fitted: Fitted) -> Candidate 
     return _candidate(fitter, fitted, ent.kind_of(entry), (entry, candidate.looked))
 
 
-def _finite(candidate: Candidate) -> Candidate | None:
-    """Return the candidate where its columns are finite and not all nothing."""
+def _seen(fitter: Fitter, candidate: Candidate) -> Candidate | None:
+    """Return the candidate where its columns are finite, and more than rounding makes of nothing."""
     with np.errstate(over="ignore"):  # what runs away is no candidate
         power = float(np.sum(candidate.columns**2))
-    return candidate if np.isfinite(power) and power > 0.0 else None
+    return candidate if np.isfinite(power) and power > NOTHING * fitter.power else None
 
 
 def started(candidate: Candidate, sizes: Floats) -> Term:

@@ -29,7 +29,7 @@ class Screened:
     sizes: Floats
     """(q,) of its columns."""
     left: float
-    """Squared error with it, of all blocks."""
+    """Squared error with it, of all blocks: of an entry that is tried as it is, not with a part of it."""
 
 
 class Screen:
@@ -60,6 +60,7 @@ class Screen:
         self._low = np.append(np.concatenate([c.low for c in found]), 0.0)[self._index] * self._scale
         self._high = np.append(np.concatenate([c.high for c in found]), 0.0)[self._index] * self._scale
         self._filled = np.eye(most) * (self._index == nothing)[:, None, :]
+        self._as_it_is = np.array([c.parts == (c.term.entry,) for c in found])[:, None]
         self._own = [self._products(k) for k in self._use]
         power = np.array([np.einsum("cqq->cq", own) for own in self._own])
         self._once = np.any(power > ONCE * np.maximum(power.sum(axis=0), 1e-300), axis=2)
@@ -100,6 +101,7 @@ class Screen:
         parts, whole, own = self._parts(model, residual)
         sizes, _, _ = self._sized(whole, own)
         before, after = np.empty(len(parts)), np.empty((len(self.candidates), len(parts)))
+        begun = np.zeros(len(self.candidates))
         for j, part in enumerate(parts):
             d, base, solved = self._sized(whole.without(part), own - self._own[j])
             d = np.where(self._once[j][:, None], sizes, d)
@@ -110,13 +112,14 @@ class Screen:
             curved = np.einsum("pcq,pcr->cqr", solved[:, self._index], turned[:, self._index])
             curved -= np.einsum("pcq,pcr->cqr", part.ad[:, self._index], solved[:, self._index])
             curved += self._own[j]
-            after[:, j] = before[j] - 2.0 * np.einsum("cq,cq->c", d, slope[self._index])
-            after[:, j] += np.einsum("cq,cqr,cr->c", d, curved, d)
+            lines = slope[self._index]
+            after[:, j] = before[j] + _parabola(lines, curved, d)
+            begun += before[j] + _parabola(lines, curved, np.where(self._as_it_is, self._scale, d))
         floor = 1e-9 * np.array([p.rr for p in parts]) + 1e-300
         gain = np.mean(np.log(np.maximum(before, floor) / np.maximum(after, floor)), axis=1)
         return [
             Screened(float(g), d[:n] / s[:n], float(left))
-            for g, d, s, n, left in zip(gain, sizes, self._scale, self._sizes, after.sum(axis=1), strict=True)
+            for g, d, s, n, left in zip(gain, sizes, self._scale, self._sizes, begun, strict=True)
         ]
 
     def explained(self, model: Fitted) -> Floats:
@@ -149,6 +152,11 @@ class Screen:
         target = (part.dr - base @ part.ad)[self._index]
         sizes = np.linalg.solve(inner, target[:, :, None])[:, :, 0]
         return np.clip(sizes, self._low, self._high), np.asarray(base), np.asarray(solved)
+
+
+def _parabola(slope: Floats, curved: Floats, sizes: Floats) -> Floats:
+    """Return how much more sizes (C, Q) of columns leave, (C,), by slopes (C, Q) and products (C, Q, Q)."""
+    return np.einsum("cq,cqr,cr->c", sizes, curved, sizes) - 2.0 * np.einsum("cq,cq->c", sizes, slope)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from recorded import RATE, run, stage, there_and_back
 
 from rtcomp.diagnosis.candidates.effects import candidates
 from rtcomp.diagnosis.candidates.scales import Scales
+from rtcomp.diagnosis.candidates.screening import look
 from rtcomp.diagnosis.fitting.baseline import baseline
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.free import Term
@@ -42,6 +43,33 @@ def test_an_effect_that_changes_nothing_where_it_is_tried_first_is_tried_elsewhe
     places = fitter.balance.plain([s.position for s in fitter.balance.data.segments])
     assert places.min() > 0.5 * low
     assert "end-stop" in {c.name for c in candidates(fitter, fitter.fit([]))}
+
+
+def test_what_rounding_alone_makes_is_no_candidate() -> None:
+    """Damping of nothing differs by no direction. It may later: what was looked at is not looked at again."""
+    slow = stage(viscous=0.0, effects=[{"name": "drive-delay", "delay": 2e-3}])
+    balance = ForceBalance(slow, load_data([run(stage(), there_and_back(12.0))]))
+    base, fitter = baseline(balance), Fitter(balance)
+    assert base.coefficients[1] == 0.0
+    found = candidates(fitter, base)
+    assert "asymmetric-viscous-friction" not in {c.name for c in found}
+
+
+def test_what_is_tried_as_it_is_leaves_what_all_of_it_leaves() -> None:
+    """A part of a far delay leaves less than all of it, and a fit that begins there goes elsewhere."""
+    recording = run(stage(effects=[{"name": "drive-delay", "delay": 4e-3}]), there_and_back(12.0))
+    balance = ForceBalance(stage(), load_data([recording]))
+    base, fitter = baseline(balance), Fitter(balance)
+    seen = look(fitter, base)
+    model, rows = seen.screen.columns_beside(base)[:, fitter.rows].T, fitter.rows
+    whole = [
+        (c, s) for c, s in zip(seen.candidates, seen.screened, strict=True) if c.parts == (c.term.entry,)
+    ]
+    assert {c.name for c, _ in whole} >= {"drive-delay", "drive-deadband"}
+    for candidate, screened in whole:
+        rest = base.residual[rows] - candidate.columns[0, rows]
+        left = rest - model @ np.linalg.lstsq(model, rest, rcond=1e-10)[0]
+        assert screened.left == pytest.approx(float(left @ left), rel=0.2)
 
 
 def test_voltages_are_tried_between_what_is_usual_and_what_is_commanded_once() -> None:
