@@ -156,7 +156,7 @@ class Screen:
 
 def _parabola(slope: Floats, curved: Floats, sizes: Floats) -> Floats:
     """Return how much more sizes (C, Q) of columns leave, (C,), by slopes (C, Q) and products (C, Q, Q)."""
-    return np.einsum("cq,cqr,cr->c", sizes, curved, sizes) - 2.0 * np.einsum("cq,cq->c", sizes, slope)
+    return np.asarray(np.einsum("cq,cqr,cr->c", sizes, curved, sizes) - 2.0 * np.sum(sizes * slope, axis=1))
 
 
 @dataclass(frozen=True)
