@@ -143,7 +143,8 @@ class Fitter:
 
     def variants(self, model: Fitted, at: int) -> Floats:
         """Return the columns (q, n) that another form of its effect number `at` would add by its own law."""
-        return variants(self, model, at)
+        made = self._forms.of(("variants", model, at), lambda: [variants(self, model, at)])
+        return np.asarray(made[0])
 
     def relative(self, model: Fitted, *, seen: bool = False) -> float:
         """Return what a model leaves over what there is, rms, not reserved; `seen`: above the noise.
