@@ -146,13 +146,16 @@ class Fitter:
         made = self._forms.of(("variants", model, at), lambda: [variants(self, model, at)])
         return np.asarray(made[0])
 
-    def relative(self, model: Fitted, *, seen: bool = False) -> float:
+    def relative(self, model: Fitted, *, seen: bool = False, first: Floats | None = None) -> float:
         """Return what a model leaves over what there is, rms, not reserved; `seen`: above the noise.
 
-        Rows count as far as motion tells what friction does there.
+        Rows count as far as motion tells what friction does there. `first` is the force (N, (n,)) with which
+        this is compared (`as_seen`).
         """
-        b, both = self.balance, (self.force(model), self.balance.drive_force())
-        left, given = ((b.trust * (as_seen(b, f) if seen else f))[self.rows] for f in both)
+        b, left, given = self.balance, self.force(model), self.balance.drive_force()
+        if seen:
+            left, given = as_seen(b, left, first), as_seen(b, given)
+        left, given = ((b.trust * f)[self.rows] for f in (left, given))
         return math.sqrt(np.mean(left**2) / max(np.mean(given**2), 1e-300))
 
     def left_by(self, stage: Stage) -> Floats:

@@ -62,7 +62,8 @@ def _of(fitter: Fitter, exponent: float) -> Fitter:
 
 def _less(one: tuple[Fitter, Fitted], other: tuple[Fitter, Fitted]) -> bool:
     """Tell whether the other model leaves less by what matters, each beside friction of its own law."""
-    before, after = (fitter.relative(model, seen=True) ** 2 for fitter, model in (one, other))
+    first = one[0].force(one[1])
+    before, after = (fitter.relative(model, seen=True, first=first) ** 2 for fitter, model in (one, other))
     gained = log_gain(one[1].errors, other[1].errors)
     return gained > 2.0 * LEAST_GAIN and before - after > NEGLIGIBLE**2
 

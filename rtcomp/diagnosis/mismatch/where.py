@@ -77,16 +77,18 @@ def as_white(balance: ForceBalance, force: Floats) -> Floats:
     return np.asarray(balance.weighed(_weighed(balance, force, balance.whitening.white)[None])[0])
 
 
-def as_seen(balance: ForceBalance, force: Floats) -> Floats:
+def as_seen(balance: ForceBalance, force: Floats, first: Floats | None = None) -> Floats:
     """Return what of a force (N, (n,)) on the compared rows stands above the sensor's noise.
 
     At each frequency as far as the drive's force does, or as a line of that force does, above what is beside
-    it as well: a tone need not be among what the drive does.
+    it as well: a tone need not be among what the drive does. What is compared counts alike: by the lines of
+    the `first` force of several.
     """
     from scipy.ndimage import grey_opening
 
     frequency, share, noise = _seen(balance)
-    own, density = spectrum(list(_by_segment(balance, force)), balance.data.rate / balance.whitening.thinning)
+    lines = list(_by_segment(balance, force if first is None else first))
+    own, density = spectrum(lines, balance.data.rate / balance.whitening.thinning)
     louder = density / np.maximum(np.interp(own, frequency, noise) * balance.noise.wiener(own) ** 2, 1e-300)
     line = np.pad(_above(np.maximum(grey_opening(louder, (NARROW,)), 1.0), louder), 1)
     line = np.max([line[:-2], line[1:-1], line[2:]], axis=0)  # it may lie at the edge of its band

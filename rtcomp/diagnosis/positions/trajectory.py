@@ -147,7 +147,7 @@ class Trajectory(Fitter):
         made = self._forms.of((model, at), lambda: [overtones(self, model, model.entries[at])])
         return np.asarray(made[0])
 
-    def relative(self, model: Fitted, *, seen: bool = False) -> float:
+    def relative(self, model: Fitted, *, seen: bool = False, first: Floats | None = None) -> float:
         """See `Fitter`: error over the way that forces moved the axis; it counts by noise anyway."""
         return float(np.sqrt(np.sum(model.residual[self.rows] ** 2) / max(self._power, 1e-300)))
 

@@ -49,7 +49,9 @@ def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, e
     gained = math.sqrt(before.sum()) - math.sqrt(after.sum())
     if gained <= LEAST_GAIN * math.sqrt(everything):
         return False
-    return fitter.relative(parent, seen=True) ** 2 - fitter.relative(model, seen=True) ** 2 > NEGLIGIBLE**2
+    without = fitter.force(parent)
+    there, left = (fitter.relative(each, seen=True, first=without) for each in (parent, model))
+    return there**2 - left**2 > NEGLIGIBLE**2
 
 
 def _as_believable(fitter: Fitter, model: Fitted, larger: Fitted | None = None) -> Fitted:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -84,7 +83,7 @@ def answer(
     notes = _notes(balance, found)
     shares = _shares(base, chosen, sets)
     named = _named(fitter, chosen, spans, sets, shares, rest)
-    if named and _worse(_gains(fitter, partial(seen_by, fitter), fitter.stage(base), fitter.stage(chosen))):
+    if named and _worse(_gains(fitter, *seen_by(fitter, fitter.stage(base), fitter.stage(chosen)))):
         notes.append(f"{', '.join(ent.names(chosen.entries))}: {NOT_BORNE_OUT}")
         named = []
     final = chosen if named else base
@@ -249,24 +248,24 @@ def _left_of_belief(fitter: Fitter, found: Search, believed: Stage, base: Fitted
 
 def _matters(fitter: Fitter, believed: Stage, retuned: Stage) -> bool:
     """Tell whether other numbers of the belief bring down an error that is not small already."""
-    relative = float(np.sqrt(np.mean(fitter.left_by(believed)[fitter.rows] ** 2)))
+    before, after = (fitter.left_by(stage) for stage in (believed, retuned))
+    relative = float(np.sqrt(np.mean(before[fitter.rows] ** 2)))
     least = -2.0 * math.log1p(-LEAST_GAIN)
-    return relative > TOLERANCE and float(_gains(fitter, fitter.left_by, believed, retuned).mean()) > least
+    return relative > TOLERANCE and float(_gains(fitter, before, after).mean()) > least
 
 
-def _gains(fitter: Fitter, left_by: Callable[[Stage], Floats], before: Stage, after: Stage) -> Floats:
-    """Return the gain of one stage on another in each block that was fitted, (B_use,)."""
-    left = (left_by(stage) ** 2 for stage in (before, after))
-    sums = [np.bincount(fitter.block, each, fitter.blocks)[fitter.use] for each in left]
+def _gains(fitter: Fitter, before: Floats, after: Floats) -> Floats:
+    """Return the gain in each block that was fitted, (B_use,), of what is left after on that before, (n,)."""
+    sums = [np.bincount(fitter.block, left**2, fitter.blocks)[fitter.use] for left in (before, after)]
     return np.asarray(np.diff(-np.log(np.maximum(sums, 1e-300)), axis=0)[0])
 
 
-def seen_by(fitter: Fitter, stage: Stage) -> Floats:
-    """Return what a stage leaves in each row, (n,), of forces above the noise, which goes by the mass."""
+def seen_by(fitter: Fitter, *stages: Stage) -> list[Floats]:
+    """Return what stages leave in each row, (n,), of forces above the noise, which goes by the mass."""
     if not fitter.by_force:
-        return fitter.left_by(stage)
-    drive, needed = fitter.balance.both_sides(stage)
-    return as_seen(fitter.balance, drive - needed)
+        return [fitter.left_by(stage) for stage in stages]
+    left = [drive - needed for drive, needed in map(fitter.balance.both_sides, stages)]
+    return [as_seen(fitter.balance, each, left[0]) for each in left]
 
 
 def _worse(gains: Floats) -> bool:

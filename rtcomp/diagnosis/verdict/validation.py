@@ -42,11 +42,9 @@ class Reserved:
         self._judged = True
         b = self._balance
         rows = b.reserved[b.block]
-        found = {}
-        power = 0.0
-        for name, stage in stages.items():
-            drive, needed = b.both_sides(stage)
-            power = power or float(np.mean(as_seen(b, drive)[rows] ** 2))
-            found[name] = float(np.sqrt(np.mean(as_seen(b, drive - needed)[rows] ** 2) / max(power, 1e-300)))
-        found["noise"] = noise_seen(b) / max(power, 1e-300) ** 0.5
-        return found
+        sides = [b.both_sides(stage) for stage in stages.values()]
+        left = [drive - needed for drive, needed in sides]
+        seen = [as_seen(b, sides[0][0]), *(as_seen(b, each, left[0]) for each in left)]
+        power, *errors = (max(float(np.sqrt(np.mean(each[rows] ** 2))), 1e-150) for each in seen)
+        relative = [each / power for each in (*errors, noise_seen(b))]
+        return dict(zip([*stages, "noise"], relative, strict=True))

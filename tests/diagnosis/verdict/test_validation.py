@@ -45,6 +45,13 @@ def test_a_judgement_counts_forces_that_stand_above_the_sensors_noise() -> None:
     assert kept(beyond, 0.02 * balance.noise_power**0.5) < 0.1
     assert noise_seen(balance) < 1.05 * balance.noise_power**0.5
 
+    # By its own lines a tone counts more than a wide band with a third more force. Compared they count alike.
+    tone = 20.0 * balance.noise_power**0.5 * np.sin(2.0 * np.pi * beyond * time)
+    sines = np.sin(2.0 * np.pi * np.linspace(0.4, 1.0, 60)[:, None] * beyond * time + np.arange(60)[:, None])
+    wide = 1.3 * tone.std() * sines.sum(axis=0) / sines.sum(axis=0).std()
+    assert np.std(as_seen(balance, tone)) > np.std(as_seen(balance, wide))
+    assert np.std(as_seen(balance, tone, wide)) < np.std(as_seen(balance, wide, wide))
+
 
 def test_a_judgement_needs_motion_in_the_reserved_blocks() -> None:
     believed, moving = stage(), there_and_back(20.0)
