@@ -70,12 +70,14 @@ def _returned(signal: Floats, found: npt.NDArray[np.bool_]) -> npt.NDArray[np.bo
 def answers(signal: Floats) -> npt.NDArray[np.bool_]:
     """Return the rows at which a controller answers a step of a `signal`: a reading, which is no outlier.
 
-    A step is a difference of readings that is unlike its neighbours by more than ANSWERED robust standard
-    deviations.
+    A step is a difference of readings that is unlike the median of its neighbours by more than ANSWERED
+    robust standard deviations: by their mean, the two rows before a step would be steps as well.
     """
     step = np.diff(signal, prepend=signal[0])
     off = np.zeros_like(step)
-    off[2:-2] = np.abs(step[2:-2] - 0.25 * (step[:-4] + step[1:-3] + step[3:-1] + step[4:]))
+    near = step[:-4], step[1:-3], step[3:-1], step[4:]
+    low, high = np.minimum.reduce(near), np.maximum.reduce(near)
+    off[2:-2] = np.abs(step[2:-2] - 0.5 * (sum(near) - low - high))
     parts = sample(off)
     usual = 1.4826 * float(np.median(np.concatenate(parts)))
     stepped = off > ANSWERED * max(usual, _resolution(sample(signal)))

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 from recording_files import motion, write_hdf5
 from scipy.signal import lfilter
 
-from rtcomp.recording.outliers import COMMAND_THRESHOLD, lawful, outliers
+from rtcomp.recording.outliers import ANSWER, COMMAND_THRESHOLD, lawful, outliers
 from rtcomp.recording.reader import read
 
 
@@ -84,10 +84,16 @@ def test_the_recording_keeps_them(tmp_path: Path) -> None:
 
 @settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.floats(1e-5, 1e-3), st.floats(0.5, 1.0), st.integers(1000, 3000))
+@example(size=1e-3, pole=1.0, row=2148)
+@example(size=1e-3, pole=0.7, row=2149)
 def test_kicks_of_a_controller_at_steps_of_its_reference_are_no_outliers(
     tmp_path: Path, size: float, pole: float, row: int
 ) -> None:
-    """The derivative of a stepped reference is in the command for a row or a few, and was really given."""
+    """The derivative of a stepped reference is in the command for a row or a few, and was really given.
+
+    A wrong sample in these rows is not told from it; one before them is.
+    """
+    assume((row - 150) % 400 > ANSWER)
     time = np.arange(4000) / 1000.0
     reference = size * np.sin(3.0 * time)
     for at in range(150, 4000, 400):
