@@ -203,8 +203,8 @@ def _grid(kind: type[Effect], moved: Sequence[Parameter], ranges: Sequence[Seque
 
     Of one with several values all are taken: a fit begins from the nearest.
     """
-    one_of = [i for i, p in enumerate(moved) if len(ranges[i]) > 1 and not ent.is_form(kind, p)]
-    return chessboard(ranges, thinned=one_of if len(one_of) > 1 else [])
+    measured = [i for i, p in enumerate(moved) if len(ranges[i]) > 1 and not ent.is_form(kind, p)]
+    return chessboard(ranges, thinned=measured if len(measured) > 1 else [])
 
 
 def _searched(kind: type[Effect], p: Parameter) -> bool:
@@ -239,11 +239,11 @@ def _candidate(
             parts = ent.basis(entry)
             columns = fitter.units([*fitted.entries, entry])
             low, high = ent.bounds_of(entry)
-            return _seen(fitter, Candidate(Term.of(entry), tuple(parts), columns, low, high, True, linear))
+            return _shown(fitter, Candidate(Term.of(entry), tuple(parts), columns, low, high, True, linear))
         if not linear:
             change = fitter.change(fitted, entry)[None, :]
             found = Candidate(Term.of(entry), (entry,), change, np.zeros(1), np.full(1, np.inf))
-            return _seen(fitter, found)
+            return _shown(fitter, found)
         p = ent.parameter(kind, linear)
         step, most = first_order(p, fitter.balance), ent.highest(entry, p)
         phases = [p.name for p in kind.parameters if p.unit == ent.PHASE]
@@ -263,7 +263,7 @@ def _candidate(
                 np.array([(most - entry[linear]) / step]),
             )
         columns = np.array([fitter.change(fitted, part) for part in parts])
-        return _seen(fitter, Candidate(term, tuple(parts), columns, low, high, looked=linear))
+        return _shown(fitter, Candidate(term, tuple(parts), columns, low, high, looked=linear))
     except ConfigError:
         return None
 
@@ -274,7 +274,7 @@ def on_other(candidate: Candidate, fitter: Fitter, fitted: Fitted) -> Candidate 
     return _candidate(fitter, fitted, ent.kind_of(entry), (entry, candidate.looked))
 
 
-def _seen(fitter: Fitter, candidate: Candidate) -> Candidate | None:
+def _shown(fitter: Fitter, candidate: Candidate) -> Candidate | None:
     """Return the candidate where its columns are finite, and more than rounding makes of nothing."""
     with np.errstate(over="ignore"):  # what runs away is no candidate
         power = float(np.sum(candidate.columns**2))

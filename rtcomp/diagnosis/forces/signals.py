@@ -35,7 +35,7 @@ BASE = ("mass", "viscous", "micro_damping")
 those of a believed model of friction, of the friction units, and a constant force."""
 FURTHEST = 0.3
 """Largest change of its logarithm that is taken from one fit."""
-FASTER = 0.02
+SPEED_STEP = 0.02
 """Relative change of the speed of micro-damping to which its damping is looked at."""
 GRAINS = 1.5
 """Motion there and back that is noise, in times the noise (rms) that smoothing leaves."""
@@ -147,9 +147,9 @@ class Signals:
         speed = self.stage.mechanics.micro_damping_speed
         here, faster = (
             self.force_of(MicroDamping(coefficient=1.0, speed=each), segment, path)
-            for each in (speed, (1.0 + FASTER) * speed)
+            for each in (speed, (1.0 + SPEED_STEP) * speed)
         )
-        return np.column_stack([here, (faster - here) / np.log1p(FASTER)])
+        return np.column_stack([here, (faster - here) / np.log1p(SPEED_STEP)])
 
     def paths(self, sensors: Sequence[Effect] = ()) -> list[Path]:
         """Return the motion of every segment, what `sensors` did to the reading undone."""

@@ -267,11 +267,13 @@ def _line(motion: View, before: Floats, after: Floats | None) -> Place | None:
         return None
     around = np.convolve(power, np.ones(101) / 101, mode="same") + 1e-300
     at = int(np.argmax(np.where(usable, power / around, 0.0)))
+    if power[at] < 30 * np.median(power[max(at - 50, 0) : at + 51]):
+        return None
     # Rows of several segments do not follow each other: a tone goes on between them, its line is cut up.
     time = motion.plain([s.time for s in motion.strips])
     f = peak_near(float(frequency[at]), rate / size, time, before)
     share = float(2.0 * abs(np.mean(np.exp(-2j * np.pi * f * time) * before)) ** 2 / np.mean(before**2))
-    if share < LEAST_SHARE or power[at] < 30 * np.median(power[max(at - 50, 0) : at + 51]):
+    if share < LEAST_SHARE:
         return None
     around_it = slice(max(at - 40, 0), at + 41)
     scale = 2.0 / window.sum()

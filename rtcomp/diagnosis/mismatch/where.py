@@ -14,6 +14,7 @@ from rtcomp.diagnosis.mismatch.locate import axes_of
 from rtcomp.diagnosis.numerics.spectrum import Response, filtered, interpolated, spectrum
 from rtcomp.diagnosis.recordings.data import Segment
 from rtcomp.kernels import Floats
+from rtcomp.stage.stage import Stage
 
 ROUNDING = 1e-9
 """Part of the force up to which what an effect does is nothing."""
@@ -95,6 +96,12 @@ def as_seen(balance: ForceBalance, force: Floats, first: Floats | None = None) -
     both = np.union1d(frequency, own)
     most = np.maximum(np.interp(both, frequency, share), np.interp(both, own, line))
     return _weighed(balance, force, interpolated(both, np.maximum(most, 1e-6)))
+
+
+def left_seen(balance: ForceBalance, *stages: Stage) -> list[Floats]:
+    """Return the force (N, (n,)) that each of `stages` leaves open, as far as it is seen, all alike."""
+    left = [drive - needed for drive, needed in map(balance.both_sides, stages)]
+    return [as_seen(balance, each, left[0]) for each in left]
 
 
 def noise_seen(balance: ForceBalance) -> float:

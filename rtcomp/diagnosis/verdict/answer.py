@@ -19,7 +19,7 @@ from rtcomp.diagnosis.fitting.unbiased import unbiased
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.mismatch.curves import left_over
 from rtcomp.diagnosis.mismatch.locate import locate
-from rtcomp.diagnosis.mismatch.where import Compared, as_seen, curves
+from rtcomp.diagnosis.mismatch.where import Compared, curves, left_seen
 from rtcomp.diagnosis.numerics.significance import SURE
 from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
 from rtcomp.diagnosis.search.confidence import Alternatives
@@ -262,10 +262,7 @@ def _gains(fitter: Fitter, before: Floats, after: Floats) -> Floats:
 
 def seen_by(fitter: Fitter, *stages: Stage) -> list[Floats]:
     """Return what stages leave in each row, (n,), of forces above the noise, which goes by the mass."""
-    if not fitter.by_force:
-        return [fitter.left_by(stage) for stage in stages]
-    left = [drive - needed for drive, needed in map(fitter.balance.both_sides, stages)]
-    return [as_seen(fitter.balance, each, left[0]) for each in left]
+    return left_seen(fitter.balance, *stages) if fitter.by_force else list(map(fitter.left_by, stages))
 
 
 def _worse(gains: Floats) -> bool:

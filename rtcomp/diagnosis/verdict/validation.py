@@ -8,7 +8,7 @@ import numpy as np
 
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.forces.blocks import LEAST_FORCE
-from rtcomp.diagnosis.mismatch.where import as_seen, noise_seen
+from rtcomp.diagnosis.mismatch.where import as_seen, left_seen, noise_seen
 from rtcomp.errors import RecordingError
 from rtcomp.stage.stage import Stage
 
@@ -42,9 +42,7 @@ class Reserved:
         self._judged = True
         b = self._balance
         rows = b.reserved[b.block]
-        sides = [b.both_sides(stage) for stage in stages.values()]
-        left = [drive - needed for drive, needed in sides]
-        seen = [as_seen(b, sides[0][0]), *(as_seen(b, each, left[0]) for each in left)]
+        seen = [as_seen(b, b.drive_force()), *left_seen(b, *stages.values())]
         power, *errors = (max(float(np.sqrt(np.mean(each[rows] ** 2))), 1e-150) for each in seen)
         relative = [each / power for each in (*errors, noise_seen(b))]
         return dict(zip([*stages, "noise"], relative, strict=True))

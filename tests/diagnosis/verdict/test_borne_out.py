@@ -73,5 +73,4 @@ def test_a_stage_is_judged_by_forces_above_the_noise(monkeypatch: pytest.MonkeyP
     assert stages[0].mass < 0.5 * stages[1].mass
     plain = [float(np.std(fitter.left_by(one))) for one in stages]
     seen = [float(np.std(left)) for left in seen_by(fitter, *stages)]
-    print(plain, seen)
     assert seen[1] / seen[0] < 0.9 * plain[1] / plain[0]
