@@ -36,6 +36,7 @@ from rtcomp.diagnosis.verdict.validation import Reserved
 from rtcomp.errors import RtcompError
 from rtcomp.recording.reader import Recording
 from rtcomp.stage.stage import Stage
+from rtcomp.units import for_axis
 
 Progress = Callable[[float, str], None]
 STICKS = (
@@ -53,6 +54,10 @@ BAND_LIMITED = "the command is taken as band-limited between rows, which fits be
 EARLY = (
     "the command acts {:.2g} ms before its row: what was read belongs to a later time than it says, or a "
     "simulation moves before it is pushed; that is no physics, and taken so"
+)
+COUNTED = (
+    "the sensor reads in counts of {:.3g} {}, as the recording tells; the stage states no sensor.resolution, "
+    "which a simulation needs"
 )
 LAW = (
     "friction yields by another law than believed: of exponent 0 at the reach of an element at once, of 1 as "
@@ -127,7 +132,10 @@ def _diagnosed(
     done = answer(stage, fitter, found, sets, reserved, seed, ends)
     say(1.0, "judge")
     notes = [BAND_LIMITED] if len(objectives) > 1 and not fitter.balance.data.held else []
-    early = fitter.balance.data.early * fitter.balance.data.period
+    data = fitter.balance.data
+    if data.count and not stage.sensor.resolution:
+        notes.append(COUNTED.format(data.count, for_axis("m", stage.axis)))
+    early = data.early * data.period
     notes += [EARLY.format(1e3 * early)] if early else []
     notes += [LAW] if any(r.parameter == EXPONENT for r in done.retuned) else []
     if done.position is not None:

@@ -74,11 +74,8 @@ def _explains_more(one: tuple[Fitter, Fitted], other: tuple[Fitter, Fitted]) -> 
     And whether it is likelier, by the variance that its replicates have. Friction that yields within a few
     counts forgets by motion that no reading tells: replicates of one law leave that, of the other less.
     """
-    noise = _noise(*one)
-    if 2.0 * noise >= one[1].sse or noise == 0.0:
-        return False
-    others = _noise(*other)
-    if 2.0 * others <= other[1].sse:
+    noise, others = shared(lambda way: _noise(*way), (one, other))
+    if not 0.0 < 2.0 * noise < one[1].sse or 2.0 * others <= other[1].sse:
         return False
     return math.log(others) + other[1].sse / others < math.log(noise) + one[1].sse / noise
 

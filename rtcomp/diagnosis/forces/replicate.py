@@ -15,6 +15,7 @@ import numpy as np
 
 from rtcomp.control.pid import pid_preset, pid_state, pid_step, pid_vector
 from rtcomp.diagnosis.forces.controller import gains
+from rtcomp.diagnosis.recordings.counts import counted
 from rtcomp.diagnosis.recordings.data import Data, Segment, averaged
 from rtcomp.kernels import Floats, compiled
 from rtcomp.physics import Place, wires
@@ -44,7 +45,7 @@ def replicate(stage: Stage, data: Data, motion: list[Floats], noise: float, seed
     """
     random = np.random.default_rng(seed)
     low, high = data.stroke
-    counts = stage.sensor.resolution
+    counts = counted(stage, data)
     recorded = data.as_recorded()
     beside = math.sqrt(max(noise**2 - counts**2 / 12.0, 0.0))  # counts, which are not white at rest
     stated = min(stage.sensor.noise, noise)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rtcomp.diagnosis.recordings.counts import counted
 from rtcomp.kernels import Floats, compiled
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class RestWeights:
     @classmethod
     def of(cls, balance: ForceBalance) -> RestWeights:
         """Return the weights of a balance that has none yet."""
-        if balance.stage.sensor.resolution == 0.0:
+        if counted(balance.stage, balance.data) == 0.0:
             rows = balance.plain([s.time for s in balance.data.segments]).size
             return cls(np.ones(rows), np.zeros(rows), np.array([0, rows]))
         random, unseen = np.random.default_rng(7), _unseen(balance)
@@ -120,7 +121,7 @@ def _drive_of(balance: ForceBalance, voltage: Floats) -> Floats:
 
 def _unseen(balance: ForceBalance) -> list[tuple[Floats, np.ndarray]]:
     """Return `courses` of each segment, as far as friction is known to go."""
-    width, read = COUNTS * balance.stage.sensor.resolution, balance.data.segments
+    width, read = COUNTS * counted(balance.stage, balance.data), balance.data.segments
     return [courses(s.position, _drive_of(balance, s.voltage), width, balance.level) for s in read]
 
 

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from rtcomp.diagnosis.recordings.counts import count_of
 from rtcomp.diagnosis.recordings.jumps import MOST, Jump, jumps
 from rtcomp.diagnosis.recordings.stretches import LEAST_ROWS, stretches
 from rtcomp.kernels import Floats
@@ -73,6 +74,8 @@ class Data:
     """Rows of the recording in one of these."""
     early: float = 0.0
     """Rows by which a held command acts before its own row, 0 to 1."""
+    count: float = 0.0
+    """m, by which readings go, as they tell it; 0 where they do not."""
 
     @property
     def period(self) -> float:
@@ -104,7 +107,7 @@ class Data:
     def as_recorded(self) -> Data:
         """Return the rows that these are means of."""
         sources = tuple(s.source or s for s in self.segments)
-        return Data(sources, self.rate * self.averaged, self.held)
+        return Data(sources, self.rate * self.averaged, self.held, count=self.count)
 
 
 def load_data(recordings: Sequence[Recording], *, held: bool = True, bandwidth: float = 0.0) -> Data:
@@ -123,7 +126,7 @@ def load_data(recordings: Sequence[Recording], *, held: bool = True, bandwidth: 
         size = MOST_ROWS // WINDOWS
         share = max(WINDOWS // len(found), 1)
         found = [w for s in found for w in _windows(s, share, size)]
-    return Data(tuple(found), rate, held, factor)
+    return Data(tuple(found), rate, held, factor, count=count_of(recordings))
 
 
 def _segments(recording: Recording) -> list[Segment]:
