@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.cores import shared
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.replicated import replicated
+from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.numerics.significance import log_gain
 from rtcomp.diagnosis.settings import LEAST_GAIN, NEGLIGIBLE
 
@@ -26,7 +29,7 @@ def law_of(fitter: Fitter, terms: Sequence[Term]) -> float:
     """Return the exponent by which `terms` leave least: that at hand, or one that leaves less.
 
     Less by what an effect must gain to matter, or noise where the one at hand leaves more. A believed model
-    of friction has its own law. Numbers of `terms` move with it, and the last may be of another form: what
+    of friction has its own law; friction that hardly holds a force has none that could be told. Numbers of `terms` move with it, and the last may be of another form: what
     suits one law may hide another.
     """
     balance = fitter.balance
@@ -39,11 +42,17 @@ def law_of(fitter: Fitter, terms: Sequence[Term]) -> float:
         return (fitter, fitter.fit(terms)) if at_hand else _by(fitter, exponent, terms)
 
     first, second = shared(beside, (was, other))
-    if not first[1].coefficients[balance.friction].any():
+    if not _holds(balance, first[1]):
         return balance.exponent
     to_other = _less(first, second) or _explains_more(first, second)
     law, best = (other, second) if to_other else (was, first)
     return law if law == STOP else _settled(*best)
+
+
+def _holds(balance: ForceBalance, model: Fitted) -> bool:
+    """Tell whether the friction of a model holds a part of the drive's force (rms) that matters."""
+    level = float(model.coefficients[balance.friction] @ balance.reaches)
+    return level > NEGLIGIBLE * float(np.sqrt(np.mean(balance.drive_force() ** 2)))
 
 
 def _by(fitter: Fitter, exponent: float, terms: Sequence[Term]) -> tuple[Fitter, Fitted]:

@@ -64,6 +64,8 @@ class Search:
     """Whether the search ended because its objective was doubted."""
     denied: bool = False
     """Whether an effect was left out because the other objective does not show it."""
+    laws: tuple[float, ...] = ()
+    """Laws of friction (exponents) that all was begun with."""
     elsewhere: bool = False
     """Whether friction is settled on another model than the chosen one."""
     as_believed: bool = False
@@ -84,7 +86,7 @@ def search(
     Stops too where the objective itself is `doubted` because of the best model so far. `first` is the look at
     all candidates beside the baseline, where there was one.
     """
-    found = Search(baseline, baseline)
+    found = Search(baseline, baseline, laws=(fitter.balance.exponent,))
     everything, short = float(baseline.errors.sum()), False
     beam, parents = [baseline], {id(baseline): math.inf}
     grown: list[Fitted] = []
@@ -211,6 +213,7 @@ def _settled_on_chosen(fitter: Fitter, found: Search) -> None:
 def _begun_again(fitter: Fitter, found: Search, parents: dict[int, float], ends: float) -> list[Fitted]:
     """Return the belief, fitted with the friction that it is to have from now on."""
     settle(fitter, (), ends, law=False)
+    found.laws += (fitter.balance.exponent,)
     found.baseline = fitter.fit([])
     parents[id(found.baseline)], found.beside, found.elsewhere = math.inf, None, False
     return [found.baseline]
@@ -229,8 +232,8 @@ def _resettled(
 
     Of the models that were `grown`, those that come near the best. Its own numbers and form were bent as
     well: both are settled in turn, as long as the error falls. What only made up for that is left out again.
-    Where friction yields by another law than before, only the belief is returned: all begins beside that. So
-    it does where friction that yields later explains more than the last effect.
+    Where friction yields by a law that nothing was begun with yet, only the belief is returned: all begins
+    beside that. So it does where friction that yields later explains more than the last effect.
     """
     later = yielding_later(fitter, found.chosen)
     if later is not None and score(later.fit(found.chosen.terms)) < score(beam[0]):
@@ -238,15 +241,15 @@ def _resettled(
         return _begun_again(fitter, found, parents, ends), []
     near = [g for g in sorted(grown, key=score) if all(g is not m for m in beam)]
     near = [g for g in near if score(g) < score(beam[0]) + NEAR][:BEAM]
-    law, best, left, found.elsewhere = fitter.balance.exponent, beam[0], math.inf, True
+    best, left, found.elsewhere = beam[0], math.inf, True
     others = [g for g in near if ent.names(g.entries) == ent.names(best.entries)]  # its other forms
     while best.sse < (1.0 - LEAST_GAIN) ** 2 * left and clock.now() < ends:
         once, left = left == math.inf, best.sse
         settle(fitter, best.terms, ends, law=once)
-        if fitter.balance.exponent != law:
+        if fitter.balance.exponent not in found.laws:
             break
         best, *others = sorted(refitted(fitter, [best, *others]), key=lambda m: (m.at_bound, m.sse))
-    if fitter.balance.exponent != law:
+    if fitter.balance.exponent not in found.laws:
         return _begun_again(fitter, found, parents, ends), []
     found.baseline = fitter.fit([])
     again = [best, *refitted(fitter, beam[1:])]

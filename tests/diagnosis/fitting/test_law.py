@@ -66,6 +66,26 @@ def test_within_a_few_counts_it_is_told_by_what_friction_forgets_unseen(true: fl
     assert balance.exponent == true
 
 
+def test_an_axis_without_friction_has_no_law_that_all_begins_anew_for() -> None:
+    """On an air bearing the grid's units fit noise: each law leaves more than the other beside the drag."""
+    air = {
+        "stage": {"mass": 6.0, "force_constant": 50.0, "voltage_limit": 10.0, "viscous": 5.4},
+        "sensor": {"noise": 3e-9, "resolution": 5e-9},
+        "controller": {"kp": 1.1e4, "ki": 2e5, "kd": 48.0},
+        "rate": RATE,
+    }
+    drag = {**air["stage"], "effects": [{"name": "quadratic-drag", "coefficient": 20.0}]}
+    recording = run(Stage.from_dict({**air, "stage": drag}), 100.0 * there_and_back(12.0))
+    belief = Stage.from_dict(air)
+    for exponent in (STOP, SOLID):
+        balance = ForceBalance(belief, load_data([recording]))
+        baseline(balance)
+        balance.exponent = exponent
+        assert law_of(Fitter(balance), [Term.of({"name": "quadratic-drag", "coefficient": 1.0})]) == exponent
+    found = diagnose(belief, [recording])
+    assert [e.names for e in found.effects] == [("quadratic-drag",)]
+
+
 def test_numbers_and_form_of_an_effect_that_suit_one_law_do_not_hide_another() -> None:
     """Beside stops the fall of friction with speed is one that what sticks follows, and as good."""
     fall = {"name": "stribeck", "rise": 0.5, "velocity": 4e-4}

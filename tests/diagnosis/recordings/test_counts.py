@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import recorded
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,7 +15,6 @@ from rtcomp.diagnosis.recordings.counts import count_of, counted
 from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.kernels import Floats
 from rtcomp.recording.reader import Recording
-from tests.diagnosis import recorded
 
 RATE = 500.0
 
