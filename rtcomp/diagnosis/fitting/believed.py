@@ -80,6 +80,15 @@ def beyond_belief(balance: ForceBalance, model: Fitted) -> bool:
     return bool(np.any(np.abs(model.coefficients) > _most(balance, model)))
 
 
+def displaces_friction(balance: ForceBalance, model: Fitted, parent: Fitted) -> bool:
+    """Tell whether a model has so much less friction than believed, which its parent has, that it displaces it.
+
+    A dead zone of the drive as wide as friction is strong explains most of what friction does.
+    """
+    least = float(balance.weights @ balance.reaches) / (1.0 + BELIEVABLE * BELIEF_SD)
+    return model.level < least <= parent.level
+
+
 def within_belief(balance: ForceBalance, model: Fitted) -> Fitted:
     """Return a model with numbers as far from the belief as they may be, and what it leaves then.
 

@@ -338,7 +338,7 @@ class Fitter:
         errors, without = left_out(joint, self.use, wide, variance, whole)
         return Fitted(
             tuple(self._sized(terms, at.system, at.c)), at.c, at.system, at.grams, at.prior, at.residual,
-            tangents, tuple(free), errors, without, at.sse, variance, weights,
+            tangents, tuple(free), errors, without, at.sse, variance, weights, self.balance.reaches,
         )  # fmt: skip
 
     def _sized(self, terms: Sequence[Term], system: System, c: Floats) -> list[Term]:

@@ -40,8 +40,15 @@ class Fitted:
     variance: float
     weights: Floats
     """N/m of the friction units."""
+    reaches: Floats
+    """Their yield displacements (m)."""
     off: Floats | None = None
     """(p + q,): by how much the numbers of its replicates are off on average; None where there are none."""
+
+    @property
+    def level(self) -> float:
+        """Return the force (N) that all its friction units hold together."""
+        return float(self.weights @ self.reaches)
 
     @property
     def whole(self) -> Floats:

@@ -51,8 +51,7 @@ def law_of(fitter: Fitter, terms: Sequence[Term]) -> float:
 
 def _holds(balance: ForceBalance, model: Fitted) -> bool:
     """Tell whether the friction of a model holds a part of the drive's force (rms) that matters."""
-    level = float(model.coefficients[balance.friction] @ balance.reaches)
-    return level > NEGLIGIBLE * float(np.sqrt(np.mean(balance.drive_force() ** 2)))
+    return model.level > NEGLIGIBLE * float(np.sqrt(np.mean(balance.drive_force() ** 2)))
 
 
 def _by(fitter: Fitter, exponent: float, terms: Sequence[Term]) -> tuple[Fitter, Fitted]:

@@ -342,5 +342,5 @@ class Trajectory(Fitter):
         errors, without = left_out(joint, self.use, wide, variance, whole)
         return Fitted(
             tuple(terms), c, system, grams, prior, rest, tangents, tuple(free), errors, without, sse,
-            variance, np.zeros(0),
+            variance, np.zeros(0), np.zeros(0),
         )  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 
 from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.fitting.believed import beyond_belief, within_belief
+from rtcomp.diagnosis.fitting.believed import beyond_belief, displaces_friction, within_belief
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
@@ -34,9 +34,12 @@ STANDS_IN = "a force that goes by {} explains more{}, and more than noise is lef
 def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, everything: float) -> bool:
     """Tell whether the effect of a model that its parent has not passes the one test and matters.
 
-    Beside other forms of the effects before it: what these would explain as well is no further effect.
+    Beside other forms of the effects before it: what these would explain as well is no further effect. Nor is
+    what takes the place of believed friction.
     """
     if null is None or model.at_bound:
+        return False
+    if fitter.by_force and displaces_friction(fitter.balance, model, parent):
         return False
     before_it = ent.names(parent.entries)
     forms = fitter.other_forms(parent, next((n for n in ent.names(model.entries) if n not in before_it), ""))

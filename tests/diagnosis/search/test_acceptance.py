@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from recorded import run, stage, there_and_back
+from recorded import STAGE, run, stage, there_and_back
 
 from rtcomp.diagnosis.fitting.baseline import baseline
 from rtcomp.diagnosis.fitting.fit import Fitter
@@ -42,6 +42,20 @@ def test_a_drive_that_gives_nothing_and_friction_that_holds_the_rest_explain_not
     true = fitter.fit([Term.of({**STRIBECK, "rise": 0.2})], base)
     assert true.sse < 0.05 * base.sse
     assert accepted(fitter, true, base, null, float(base.errors.sum()))
+
+
+@pytest.mark.parametrize(("times", "found"), [(1.0, True), (2.5, False)])
+def test_what_takes_the_place_of_believed_friction_is_no_finding(times: float, found: bool) -> None:
+    """A dead zone beside which friction holds less than half of what is believed; without it more."""
+    dead = {"name": "drive-deadband", "width": 0.3}
+    recording = run(stage(effects=[dead]), there_and_back(16.0))
+    friction = [{**e, "stiffness": times * e["stiffness"]} for e in STAGE["stage"]["friction"]]
+    balance = ForceBalance(stage(friction=friction), load_data([recording]))
+    base, fitter = baseline(balance), Fitter(balance)
+    model = fitter.fit([Term.of(dead)], base)
+    assert model.sse < 1e-3 * base.sse
+    null = Null(np.linspace(0.0, 0.01, 19), np.tile(model.errors, (19, 1)))
+    assert accepted(fitter, model, base, null, float(base.errors.sum())) is found
 
 
 def found_in(fitter: Fitter, model: Fitted, null: Null) -> list[str]:
