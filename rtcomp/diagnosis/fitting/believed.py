@@ -81,7 +81,7 @@ def beyond_belief(balance: ForceBalance, model: Fitted) -> bool:
 
 
 def displaces_friction(balance: ForceBalance, model: Fitted, parent: Fitted) -> bool:
-    """Tell whether a model has so much less friction than believed, which its parent has, that it displaces it.
+    """Tell whether a model has less friction than could be believed, where its parent has more.
 
     A dead zone of the drive as wide as friction is strong explains most of what friction does.
     """

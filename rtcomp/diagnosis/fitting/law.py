@@ -29,8 +29,8 @@ def law_of(fitter: Fitter, terms: Sequence[Term]) -> float:
     """Return the exponent by which `terms` leave least: that at hand, or one that leaves less.
 
     Less by what an effect must gain to matter, or noise where the one at hand leaves more. A believed model
-    of friction has its own law; friction that hardly holds a force has none that could be told. Numbers of `terms` move with it, and the last may be of another form: what
-    suits one law may hide another.
+    of friction has its own law; friction that hardly holds a force has none that could be told. Numbers of
+    `terms` move with it, and the last may be of another form: what suits one law may hide another.
     """
     balance = fitter.balance
     if balance.models.size:
