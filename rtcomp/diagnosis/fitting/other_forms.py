@@ -8,6 +8,7 @@ same is no further effect.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -86,25 +87,31 @@ def _bent(balance: ForceBalance, entry: Entry, force: Floats) -> Floats:
 def of_position(balance: ForceBalance, entry: Entry) -> Floats:
     """Return the whitened columns (q, n) of any other function of position, where an entry's force is one.
 
-    As large as what varies of the force; none where that is no smooth function of position. All are nothing
-    where the force is least, and none has a part like it: a spring by any law has its zero, and a constant
-    beside it is none.
+    A spring by any law has its zero, and a constant beside it is none.
     """
-    from scipy.linalg import null_space
-
     none = np.zeros((0, balance.block.size))
     if not ent.adds_force(ent.kind_of(entry)):
         return none
     effect, pairs = ent.build(entry), zip(balance.data.segments, balance.paths(), strict=True)
     force = balance.plain([balance.force_of(effect, segment, path) for segment, path in pairs])
-    position = balance.plain([p.x for p in balance.paths()])
-    size, splines = _size(force), _natural_splines(position)
-    parts = splines @ force / position.size
-    if not _size(force - parts @ splines) < SMOOTH * size:
-        return none
-    zero = int(np.argmin(np.abs(force)))
-    others = null_space(parts[None, 1:]).T @ (splines[1:] - splines[1:, zero, None])
-    return np.array([as_white(balance, size * each) for each in others])
+    others = _other_functions(force, balance.plain([p.x for p in balance.paths()]))
+    return np.array([as_white(balance, each) for each in others]) if others.size else none
+
+
+def _other_functions(signal: Floats, position: Floats) -> Floats:
+    """Return other smooth functions (q, n) of a position (m, (n,)) than a signal, (n,).
+
+    They are as large as what varies of it, nothing where it is least, and have no part like it. None where
+    it is no smooth function of the position.
+    """
+    from scipy.linalg import null_space
+
+    size, splines = _size(signal), _natural_splines(position)
+    parts = splines @ signal / position.size
+    if not _size(signal - parts @ splines) < SMOOTH * size:
+        return np.zeros((0, signal.size))
+    zero = int(np.argmin(np.abs(signal)))
+    return np.asarray(size * null_space(parts[None, 1:]).T @ (splines[1:] - splines[1:, zero, None]))
 
 
 def _size(force: Floats) -> float:
@@ -146,13 +153,21 @@ def _by_its_own(fitter: Fitter, model: Fitted, at: int) -> Iterator[Floats]:
     if ent.goes_by_time(kind):
         yield _bent_along(fitter, model, at, balance.plain([s.time for s in balance.data.segments]))
     if ent.goes_by_friction(kind):
-        own = balance.friction
-        friction = model.coefficients[own] @ model.system.columns[own]
-        yield _bent_along(fitter, model, at, as_force(balance, friction))
+        yield _bent_along(fitter, model, at, _friction(balance, model))
     if kind.place is Place.FRICTION and not (ent.adds_force(kind) or ent.goes_by_time(kind)):
         larger = balance.plain(larger_by(balance, ent.build(model.entries[at])))
-        if np.ptp(larger) > ROUNDING:
+        others = _other_functions(larger, balance.plain([p.x for p in balance.paths()]))
+        if others.size:
+            friction = _friction(balance, model)
+            yield np.array([as_white(balance, friction * each) for each in others])
+        elif np.ptp(larger) > ROUNDING:
             yield _bent_along(fitter, model, at, larger)
+
+
+def _friction(balance: ForceBalance, model: Fitted) -> Floats:
+    """Return the force (N, (n,)) of a model's friction."""
+    own = balance.friction
+    return as_force(balance, model.coefficients[own] @ model.system.columns[own])
 
 
 def _bent_along(fitter: Fitter, model: Fitted, at: int, signal: Floats) -> Floats:
@@ -166,18 +181,18 @@ def overtones(fitter: Fitter, model: Fitted, entry: Entry) -> Floats:
 
     A period that was fitted without overtones is biased: the last column is what all of them do where they
     are longer, by one factor. Each by its own, they are no wave but any function of the position. None of
-    what is no wave, or does not repeat within the stroke: that is such a function too.
+    what is no wave, or is a force that does not repeat within the stroke: that is such a function too.
     """
     kind = ent.kind_of(entry)
     phase = next((p.name for p in kind.parameters if p.unit == ent.PHASE), None)
     low, high = fitter.balance.data.stroke
-    wave = phase is not None and {ent.PERIOD, ent.AMPLITUDE} <= entry.keys()
-    if phase is None or not wave or 2.0 * float(entry[ent.PERIOD]) > high - low:
+    wave, period = {ent.PERIOD, ent.AMPLITUDE} <= entry.keys(), float(entry.get(ent.PERIOD, 0.0))
+    stroke = math.inf if kind.place is Place.FRICTION else high - low  # which goes by position in any way
+    if phase is None or not wave or 2.0 * period > stroke:
         return np.zeros((0, model.residual.size))
     still = {n: ent.neutral(kind, n) for n in kind.linear if n in entry and n != ent.AMPLITUDE}
     waves, slopes = np.zeros((0, model.residual.size)), np.zeros((0, model.residual.size))
-    period = float(entry[ent.PERIOD])
-    repeated = [repeats for repeats in OTHERS if 2.0 * repeats * period <= high - low]
+    repeated = [repeats for repeats in OTHERS if 2.0 * repeats * period <= stroke]
     for over in (one for repeats in repeated for one in OTHERS[repeats]):
         made = []
         for longer in (0.0, LONGER * period / (high - low)):

@@ -69,6 +69,10 @@ LAWS: list[tuple[dict[str, Any], dict[str, Any]]] = [
     ({"name": "stribeck", "rise": 0.3, "velocity": 2e-3}, {"form": "exponential"}),
     ({"name": "stiction-ageing", "growth": 0.3, "distance": 2e-5}, {"onset": 0.3}),
     ({"name": "non-congruent-friction", "softening": 0.5}, {"form": "elements"}),
+    (
+        {"name": "position-dependent-friction", "amplitude": 0.3, "period": 6e-4, "phase": 0.3},
+        {"period": 4.5e-4, "phase": 1.7},
+    ),
 ]
 """Effects, and other laws of the same."""
 
@@ -226,14 +230,27 @@ def test_what_goes_by_speed_beside_a_law_of_speed_that_no_number_bends_is_a_furt
     assert found == ["", "speed"]
 
 
-@pytest.mark.parametrize(("times", "harmonics"), [(1.8, 0), (2.6, 2), (4.4, 4)])
-def test_harmonics_are_of_a_wave_that_repeats_within_the_stroke(times: float, harmonics: int) -> None:
-    """Those of twice the period too, where that comes twice; two columns each, and one by the period."""
+@pytest.mark.parametrize(
+    ("name", "times", "harmonics"),
+    [
+        ("cogging", 1.8, 0),
+        ("cogging", 2.6, 2),
+        ("cogging", 4.4, 4),
+        ("position-dependent-friction", 1.8, 4),
+    ],
+)
+def test_harmonics_are_of_a_wave_that_repeats_within_the_stroke(
+    name: str, times: float, harmonics: int
+) -> None:
+    """Those of twice the period too, where that comes twice; two columns each, and one by the period.
+
+    Friction may go by the position in any way.
+    """
     axis = stage()
     balance = ForceBalance(axis, load_data([run(axis, there_and_back(12.0))]))
     base, fitter = baseline(balance), Fitter(balance)
     low, high = balance.data.stroke
-    wave = {"name": "cogging", "amplitude": 0.5, "period": (high - low) / times, "phase": 0.3}
+    wave = {"name": name, "amplitude": 0.5, "period": (high - low) / times, "phase": 0.3}
     model = fitter.fit([Term(wave, frozenset())], base)
     assert overtones(fitter, model, wave).shape[0] == (2 * harmonics + 1 if harmonics else 0)
 
