@@ -254,10 +254,12 @@ class Diagnosis:
         if self.verdict == "retuned":
             moved = ", ".join(r.parameter for r in self.retuned) or "numbers that this motion does not part"
             return f"No physics is missing; other values of {moved} explain the recording."
-        rest = " A part remains that no entry of the catalogue explains." if self._remains else ""
         if named:
+            rest = " A part remains that no entry of the catalogue explains." if self._remains else ""
             return f"Missing: {', and '.join(named)}.{rest}"
-        return f"Something is missing that no entry of the catalogue explains.{rest if named else ''}"
+        if self.not_tried:
+            return "Something is missing; there was no time to try all that it may be."
+        return "Something is missing that no entry of the catalogue explains."
 
     @property
     def _remains(self) -> bool:

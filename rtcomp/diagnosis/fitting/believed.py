@@ -80,13 +80,16 @@ def beyond_belief(balance: ForceBalance, model: Fitted) -> bool:
     return bool(np.any(np.abs(model.coefficients) > _most(balance, model)))
 
 
-def displaces_friction(balance: ForceBalance, model: Fitted, parent: Fitted) -> bool:
-    """Tell whether a model has less friction than could be believed, where its parent has more.
+def displaces_belief(balance: ForceBalance, model: Fitted, parent: Fitted) -> bool:
+    """Tell whether a model has less mass or friction than could be believed, where its parent has enough.
 
-    A dead zone of the drive as wide as friction is strong explains most of what friction does.
+    A dead zone of the drive as wide as friction is strong explains most of what friction does, and a lag of
+    the drive beside hardly any mass leaves hardly any noise.
     """
-    least = float(balance.weights @ balance.reaches) / (1.0 + BELIEVABLE * BELIEF_SD)
-    return model.level < least <= parent.level
+    believed = balance.stage.mass, float(balance.weights @ balance.reaches)
+    pairs = (model.coefficients[0], parent.coefficients[0]), (model.level, parent.level)
+    least = [each / (1.0 + BELIEVABLE * BELIEF_SD) for each in believed]
+    return any(own < low <= before for low, (own, before) in zip(least, pairs, strict=True))
 
 
 def within_belief(balance: ForceBalance, model: Fitted) -> Fitted:

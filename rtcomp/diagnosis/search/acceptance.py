@@ -11,7 +11,7 @@ import numpy as np
 
 from rtcomp.diagnosis import clock
 from rtcomp.diagnosis import entries as ent
-from rtcomp.diagnosis.fitting.believed import beyond_belief, displaces_friction, within_belief
+from rtcomp.diagnosis.fitting.believed import beyond_belief, displaces_belief, within_belief
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
@@ -35,11 +35,9 @@ def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, e
     """Tell whether the effect of a model that its parent has not passes the one test and matters.
 
     Beside other forms of the effects before it: what these would explain as well is no further effect. Nor is
-    what takes the place of believed friction.
+    what takes the place of believed mass or friction.
     """
-    if null is None or model.at_bound:
-        return False
-    if fitter.by_force and displaces_friction(fitter.balance, model, parent):
+    if null is None or impossible(fitter, model, parent):
         return False
     before_it = ent.names(parent.entries)
     forms = fitter.other_forms(parent, next((n for n in ent.names(model.entries) if n not in before_it), ""))
@@ -55,6 +53,12 @@ def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, e
     without = fitter.force(parent)
     there, left = (fitter.relative(each, seen=True, first=without) for each in (parent, model))
     return there**2 - left**2 > NEGLIGIBLE**2
+
+
+def impossible(fitter: Fitter, model: Fitted, parent: Fitted) -> bool:
+    """Tell whether a number of a model is at its bound, or believed mass or friction is displaced by it."""
+    displaces = fitter.by_force and displaces_belief(fitter.balance, model, parent)
+    return model.at_bound or displaces
 
 
 def _as_believable(fitter: Fitter, model: Fitted, larger: Fitted | None = None) -> Fitted:

@@ -19,6 +19,7 @@ from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.intervals import told
 from rtcomp.diagnosis.fitting.other_forms import any_laws, errors_beside, in_any_form, of_position
 from rtcomp.diagnosis.numerics.significance import confidence_set, log_gain, probabilities
+from rtcomp.diagnosis.search.acceptance import impossible
 from rtcomp.diagnosis.search.replicates import best
 from rtcomp.diagnosis.search.selection import Search
 from rtcomp.diagnosis.search.separate import separate
@@ -203,7 +204,7 @@ def _others(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -
     """Return models with another effect in the place of one of the chosen."""
     chosen = found.chosen
     name = chosen.terms[at].entry["name"]
-    known = [_with_last(fitter, m, rest) for m in found.alternatives if _one_more(m, rest, name)]
+    known = [_with_last(fitter, m, rest) for m in found.alternatives if _one_more(fitter, m, rest, name)]
     if not known and clock.now() < ends:
         known = _looked_up(fitter, found, at, rest, ends)
     same = ent.build(chosen.terms[at].entry).equivalent()
@@ -212,10 +213,10 @@ def _others(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float) -
     return [*known, *fitted_in_time(fitter, rest, [Term.of({"name": same.name, **same.values})], math.inf)]
 
 
-def _one_more(model: Fitted, rest: Fitted, but: str) -> bool:
-    """Tell whether a model has the effects of `rest` and one more, other than `but`, and none at a bound."""
+def _one_more(fitter: Fitter, model: Fitted, rest: Fitted, but: str) -> bool:
+    """Tell whether a model has the effects of `rest` and one more, other than `but`, and is possible."""
     names = list(ent.names(model.entries))
-    if model.at_bound or but in names or len(names) != len(rest.terms) + 1:
+    if impossible(fitter, model, rest) or but in names or len(names) != len(rest.terms) + 1:
         return False
     return set(ent.names(rest.entries)) < set(names)
 
@@ -238,4 +239,4 @@ def _looked_up(fitter: Fitter, found: Search, at: int, rest: Fitted, ends: float
         k for k in best([c.family for c in made], [s.gain for s in screened], 3) if screened[k].gain > least
     ]
     terms = [started(made[k], screened[k].sizes) for k in tried]
-    return [m for m in fitted_in_time(fitter, rest, terms, ends) if not m.at_bound]
+    return [m for m in fitted_in_time(fitter, rest, terms, ends) if not impossible(fitter, m, rest)]

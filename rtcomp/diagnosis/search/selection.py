@@ -60,6 +60,8 @@ class Search:
     not_tried: list[str] = field(default_factory=list)
     dropped: list[str] = field(default_factory=list)
     """What was found and not kept, and why."""
+    cut_short: bool = False
+    """Whether time ended beside the belief alone, though the test does not say that no effect is missing."""
     doubted: bool = False
     """Whether the search ended because its objective was doubted."""
     denied: bool = False
@@ -146,12 +148,21 @@ def search(
         if doubted is not None and beam and doubted(beam[0]):
             found.doubted = True
             break
+    found.cut_short = _cut_short(fitter, found, alone, everything)
     if found.elsewhere:
         _settled_on_chosen(fitter, found)
     if fitter.offset and found.chosen.terms:
         _offset_judged(fitter, found)
     _solid(fitter, found)
     return found
+
+
+def _cut_short(fitter: Fitter, found: Search, alone: Look | None, everything: float) -> bool:
+    """Tell whether a look `alone` beside the belief leaves open that an effect is missing, and time ended."""
+    if not found.not_tried or found.chosen.terms or alone is None or alone.null is None:
+        return False
+    may_be = not alone.screened or alone.null.p_value(alone.gain) < LEVEL
+    return may_be and not exhausted(fitter, found.chosen, everything)
 
 
 def _skipped(found: Search, cut: bool) -> None:

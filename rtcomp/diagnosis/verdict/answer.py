@@ -62,7 +62,7 @@ class Rest:
         share = max(error - noise, 0.0) / max(first - noise, 1e-300)
         # Of many small things none of which could be named, the square counts: they do not add up to one.
         matters = relative > TOLERANCE and (not found.chosen.terms or share > LEAST_GAIN)
-        significant = matters and found.null.p_of_error(errors) < LEVEL
+        significant = (matters or found.cut_short) and found.null.p_of_error(errors) < LEVEL
         return cls(significant, min(share, 1.0))
 
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+import pytest
 from recorded import RATE, run, stage, there_and_back
 
+from rtcomp.diagnosis import clock
 from rtcomp.diagnosis.candidates.screening import Look, Screen, look
 from rtcomp.diagnosis.fitting.baseline import baseline, settle
 from rtcomp.diagnosis.fitting.fit import Fitter
@@ -15,6 +18,7 @@ from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.search.beam import grown_further, in_other_forms, with_two
 from rtcomp.diagnosis.search.selection import search
+from rtcomp.diagnosis.verdict.answer import Rest
 from rtcomp.physics import catalogue
 
 SINE = {"name": "cogging", "form": "sine", "amplitude": 0.1, "period": 1e-4, "phase": 0.4}
@@ -88,3 +92,17 @@ def test_of_two_that_pass_only_together_both_are_found() -> None:
     assert sorted(e["name"] for e in best.entries) == ["frictional-lag", "sensor-delay"]
     assert best.sse < 0.02 * base.sse < min(model.sse for model in grown)
     assert not with_two(fitter, best, seen, [best], math.inf)
+
+
+@pytest.mark.parametrize(("effects", "missing"), [([], False), ([{**SINE, "amplitude": 0.01}], True)])
+def test_without_time_for_effects_what_is_missing_is_said_to_be(
+    effects: list[dict[str, Any]], missing: bool
+) -> None:
+    """A wave of less than a hundredth of the force, which may be left where it could not be named."""
+    recording = run(stage(effects=effects), there_and_back(12.0))
+    balance = ForceBalance(stage(), load_data([recording]))
+    base, fitter = baseline(balance), Fitter(balance)
+    assert fitter.relative(base, seen=True) < 0.01
+    found = search(fitter, base, clock.now(), lambda _part, _what: None)
+    assert found.chosen is base and found.cut_short is missing
+    assert Rest.of(fitter, found).significant is missing
