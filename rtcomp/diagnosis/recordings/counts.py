@@ -58,8 +58,6 @@ def _sound(recording: Recording) -> list[Floats]:
 
 def _steps(position: Floats) -> Floats:
     """Return what sound neighbours that differ differ by (m, (n,))."""
-    steps, largest = (
-        np.abs(np.diff(position)),
-        np.max(np.abs(position), initial=0.0, where=position == position),
-    )
+    steps = np.abs(np.diff(position))
+    largest = np.max(np.abs(position), initial=0.0, where=~np.isnan(position))
     return np.asarray(steps[steps > NO_CHANGE * largest])

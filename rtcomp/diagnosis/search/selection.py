@@ -14,6 +14,7 @@ from rtcomp.diagnosis.fitting.baseline import settle, yielding_later
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.fitting.law import SETTLED
 from rtcomp.diagnosis.fitting.stage_of import bias_entry
 from rtcomp.diagnosis.numerics.significance import Null
 from rtcomp.diagnosis.search.acceptance import accepted, doubts, exhausted, pruned, score
@@ -221,6 +222,11 @@ def _settled_on_chosen(fitter: Fitter, found: Search) -> None:
     found.alternatives = refitted(fitter, found.alternatives)
 
 
+def _new_law(fitter: Fitter, found: Search) -> bool:
+    """Tell whether friction yields by a law that nothing was begun with yet."""
+    return all(abs(fitter.balance.exponent - law) > SETTLED for law in found.laws)
+
+
 def _begun_again(fitter: Fitter, found: Search, parents: dict[int, float], ends: float) -> list[Fitted]:
     """Return the belief, fitted with the friction that it is to have from now on."""
     settle(fitter, (), ends, law=False)
@@ -257,11 +263,9 @@ def _resettled(
     while best.sse < (1.0 - LEAST_GAIN) ** 2 * left and clock.now() < ends:
         once, left = left == math.inf, best.sse
         settle(fitter, best.terms, ends, law=once)
-        if fitter.balance.exponent not in found.laws:
-            break
+        if _new_law(fitter, found):
+            return _begun_again(fitter, found, parents, ends), []
         best, *others = sorted(refitted(fitter, [best, *others]), key=lambda m: (m.at_bound, m.sse))
-    if fitter.balance.exponent not in found.laws:
-        return _begun_again(fitter, found, parents, ends), []
     found.baseline = fitter.fit([])
     again = [best, *refitted(fitter, beam[1:])]
     parents.update({id(new): parents[id(old)] for new, old in zip(again, beam, strict=True)})
