@@ -104,7 +104,7 @@ def search(
             seen = _judged(fitter, beam[0], everything, seed + step, say, at_hand, known, ends, late=late)
             judged = sound(seen, beam[0], parents[id(beam[0])], found)
             if judged is None:
-                beam.pop(0)
+                grown = _of_other_effects(grown, beam.pop(0))  # nor does it stand in for what is judged
         if judged is None or judged.null is None:
             break
         null = judged.null
@@ -212,6 +212,10 @@ def _solid(fitter: Fitter, found: Search) -> None:
 
 def _effects_of(model: Fitted) -> tuple[str, ...]:
     return tuple(sorted(ent.names(model.entries)))
+
+
+def _of_other_effects(models: Sequence[Fitted], one: Fitted) -> list[Fitted]:
+    return [m for m in models if _effects_of(m) != _effects_of(one)]
 
 
 def _settled_on_chosen(fitter: Fitter, found: Search) -> None:

@@ -10,14 +10,17 @@ import pytest
 from recorded import RATE, run, stage, there_and_back
 
 from rtcomp.diagnosis import clock
+from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.candidates.screening import Look, Screen, look
 from rtcomp.diagnosis.fitting.baseline import baseline, settle
 from rtcomp.diagnosis.fitting.fit import Fitter
+from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.recordings.data import load_data
+from rtcomp.diagnosis.search import selection
 from rtcomp.diagnosis.search.beam import grown_further, in_other_forms, with_two
-from rtcomp.diagnosis.search.selection import search
+from rtcomp.diagnosis.search.selection import Search, search
 from rtcomp.diagnosis.verdict.answer import Rest
 from rtcomp.physics import catalogue
 
@@ -106,3 +109,26 @@ def test_without_time_for_effects_what_is_missing_is_said_to_be(
     found = search(fitter, base, clock.now(), lambda _part, _what: None)
     assert found.chosen is base and found.cut_short is missing
     assert Rest.of(fitter, found).significant is missing
+
+
+def test_what_is_not_sound_does_not_stand_in_the_place_of_what_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A delay of the drive that its own replicates deny is no other explanation of one of the sensor."""
+    delay = {"name": "drive-delay", "delay": 4e-3}
+    data = load_data([run(stage(effects=[delay]), there_and_back(8.0))])
+
+    def found() -> list[set[str]]:
+        balance = ForceBalance(stage(), data)
+        base = baseline(balance)
+        done = search(Fitter(balance), base, math.inf, lambda _part, _what: None)
+        return [set(ent.names(m.entries)) for m in (done.chosen, *done.alternatives)]
+
+    chosen, *others = found()
+    (name,) = chosen
+    assert others
+    unsound = selection.sound
+
+    def denied(seen: Look, model: Fitted, parent: float, before: Search) -> Look | None:
+        return None if name in ent.names(model.entries) else unsound(seen, model, parent, before)
+
+    monkeypatch.setattr(selection, "sound", denied)
+    assert all(name not in names for names in found())
