@@ -81,15 +81,15 @@ def beyond_belief(balance: ForceBalance, model: Fitted) -> bool:
 
 
 def displaces_belief(balance: ForceBalance, model: Fitted, parent: Fitted) -> bool:
-    """Tell whether a model has less mass or friction than could be believed, where its parent has enough.
+    """Tell whether a model has far less mass or friction than is believed, and than its parent has.
 
     A dead zone of the drive as wide as friction is strong explains most of what friction does, and a lag of
     the drive beside hardly any mass leaves hardly any noise.
     """
     believed = balance.stage.mass, float(balance.weights @ balance.reaches)
     pairs = (model.coefficients[0], parent.coefficients[0]), (model.level, parent.level)
-    least = [each / (1.0 + BELIEVABLE * BELIEF_SD) for each in believed]
-    return any(own < low <= before for low, (own, before) in zip(least, pairs, strict=True))
+    far = 1.0 + BELIEVABLE * BELIEF_SD
+    return any(far * own < min(sure, before) for sure, (own, before) in zip(believed, pairs, strict=True))
 
 
 def within_belief(balance: ForceBalance, model: Fitted) -> Fitted:

@@ -46,8 +46,8 @@ def test_a_drive_that_gives_nothing_and_friction_that_holds_the_rest_explain_not
 
 @pytest.mark.parametrize(("times", "found"), [(1.0, True), (2.5, False)])
 def test_what_takes_the_place_of_believed_friction_is_no_finding(times: float, found: bool) -> None:
-    """A dead zone beside which friction holds less than half of what is believed; without it more."""
-    dead = {"name": "drive-deadband", "width": 0.3}
+    """A dead zone beside which friction holds less than half of what is believed, and of that without it."""
+    dead = {"name": "drive-deadband", "width": 0.6}
     recording = run(stage(effects=[dead]), there_and_back(16.0))
     friction = [{**e, "stiffness": times * e["stiffness"]} for e in STAGE["stage"]["friction"]]
     balance = ForceBalance(stage(friction=friction), load_data([recording]))

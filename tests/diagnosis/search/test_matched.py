@@ -15,6 +15,7 @@ from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.recordings.data import load_data
+from rtcomp.diagnosis.search.acceptance import accepted
 from rtcomp.diagnosis.search.beam import shown_by_more_than_fitting
 from rtcomp.diagnosis.search.matched import matched
 from rtcomp.diagnosis.search.replicates import null_of
@@ -93,6 +94,7 @@ def test_a_lag_with_hardly_any_mass_is_further_from_its_own_recordings() -> None
     assert lag.errors.sum() < 0.6 * base.errors.sum()
     nothing = Screen([], fitter)
     before, own = (null_of(fitter, m, nothing, 0.0, 0) for m in (base, lag))
+    assert not accepted(fitter, lag, base, before, float(base.errors.sum()))
     step = Search(base, base, before)
     assert sound(Look([], [], nothing, own), lag, math.inf, step) is None
     assert sound(Look([], [], nothing, before), base, math.inf, Search(base, base)) is not None
