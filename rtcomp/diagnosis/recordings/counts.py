@@ -18,11 +18,9 @@ if TYPE_CHECKING:
 SMALL = 10.0
 """Differences of up to so many of the least are looked at: of more, rounding in the file is a part."""
 NEAR = 0.1
-"""How near to a whole number of counts a difference must be, in counts."""
-MOST, FEW = 0.95, 20
-"""Part of the differences that must be so near, by chance one in five is; so many differences at least."""
-ROUNDS = 3
-"""Times that the count is fitted to the differences anew."""
+"""How near to a whole number of counts half of the differences are, in counts: by chance one in five is."""
+FEW = 20
+"""Least number of differences."""
 NO_CHANGE = 1e-12
 """Part of the largest reading below which a difference is rounding."""
 
@@ -41,13 +39,11 @@ def count_of(recordings: Sequence[Recording]) -> float:
     if steps.size < FEW:
         return 0.0
     count = float(np.partition(steps, FEW // 2)[FEW // 2])  # a few that are no counts may be less
-    for _ in range(ROUNDS):
-        small = steps[steps < SMALL * count]
-        whole = np.round(small / count)
-        count = float((small @ whole) / (whole @ whole))
-    apart = small / count
-    near = np.abs(apart - np.round(apart)) < NEAR
-    return count if small.size >= FEW and near.mean() >= MOST else 0.0
+    small = steps[steps < SMALL * count]
+    whole = np.round(small / count)
+    count = float((small @ whole) / (whole @ whole))
+    off = np.abs(small / count - np.round(small / count))
+    return count if small.size >= FEW and np.median(off) < NEAR else 0.0
 
 
 def _sound(recording: Recording) -> list[Floats]:

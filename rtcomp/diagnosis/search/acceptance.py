@@ -34,8 +34,8 @@ STANDS_IN = "a force that goes by {} explains more{}, and more than noise is lef
 def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, everything: float) -> bool:
     """Tell whether the effect of a model that its parent has not passes the one test and matters.
 
-    Beside other forms of the effects before it: what these would explain as well is no further effect. Nor is
-    what takes the place of believed mass or friction.
+    What other forms of the effects before it would explain as well is no further effect. What takes the place
+    of believed mass or friction is none.
     """
     if null is None or impossible(fitter, model, parent):
         return False
