@@ -6,7 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rtcomp.diagnosis.numerics.spectrum import Response, interpolated, motion_spectrum, spectrum
+from rtcomp.diagnosis.numerics.spectrum import (
+    Response,
+    interpolated,
+    motion_spectrum,
+    spectrum,
+    white_noise,
+)
 from rtcomp.diagnosis.recordings.data import Data, Segment
 from rtcomp.kernels import Floats
 from rtcomp.stage.stage import Stage
@@ -40,7 +46,7 @@ class Noise:
 
     @classmethod
     def of(cls, stage: Stage, data: Data) -> Noise:
-        """Take the noise that the stage states, within what the recording can have; else the recording's.
+        """Take the noise that the stage states, or what the recording plainly has more; else the recording's.
 
         Noise that is larger than all there is at some frequency is not there. Where a stage says nothing, all
         that stands in the weakest band, be it leaked from the motion, counts as noise: too much of it says
@@ -49,7 +55,7 @@ class Noise:
         positions, stated = [s.position for s in data.segments], cls.stated(stage)
         frequency, density = (motion_spectrum if stated > 0.0 else spectrum)(positions, data.rate)
         most = float(np.sqrt(density.min() * 0.5 * data.rate))
-        rms = min(max(stated, 0.1 * most), most) if stated > 0.0 else most
+        rms = min(max(stated, white_noise(positions)), most) if stated > 0.0 else most
         floor = rms**2 / (0.5 * data.rate)
         share = np.maximum(1.0 - floor / density, 1e-6)
         signal = interpolated(frequency, share.copy())

@@ -48,8 +48,7 @@ def replicate(stage: Stage, data: Data, motion: list[Floats], noise: float, seed
     counts = counted(stage, data)
     recorded = data.as_recorded()
     beside = math.sqrt(max(noise**2 - counts**2 / 12.0, 0.0))  # counts, which are not white at rest
-    stated = min(stage.sensor.noise, noise)
-    rest = max(stated if stage.sensor.noise > 0.0 else beside, DITHER * counts)
+    rest = max(min(stage.sensor.noise, noise), beside, DITHER * counts)
     stage = stage.with_changes(sensor={"noise": rest, "resolution": counts})
     finer = _finer(data)
     along = zip(recorded.segments, motion, strict=True)

@@ -16,6 +16,8 @@ PAD = 0.1
 """Part of a signal that is mirrored beyond each of its ends before it is filtered."""
 BANDS = 60
 """Bands, equally wide in the logarithm of frequency, over which spectra are smoothed."""
+WINDOW = 256
+"""Rows of the windows that tell white noise: some are without what is rare."""
 AT_A_TIME = 4
 """Signals that are transformed together: more do not stay in the processor's cache."""
 OF_A_POINT = 100.0
@@ -172,6 +174,28 @@ def motion_spectrum(positions: list[Floats], rate: float) -> tuple[Floats, Float
     """
     frequency, density = spectrum([np.diff(x, 2) for x in positions], rate)
     return frequency, density / (2.0 * np.sin(np.pi * frequency / rate)) ** 4
+
+
+def white_noise(positions: list[Floats]) -> float:
+    """Return the rms of white noise in positions, (K,) each; 0 where motion hides it, or all are short.
+
+    Noise is as dense in the highest octave as in the one below. Motion falls with frequency, at the least as
+    a step does: what the lower octave has more is taken away so. The median over short windows passes over
+    what is not always there, as a jump.
+    """
+    curved = [np.diff(x, 2) for x in positions]
+    windows = np.concatenate([c[: c.size // WINDOW * WINDOW].reshape(-1, WINDOW) for c in curved])
+    if not windows.size:
+        return 0.0
+    shape = np.hanning(WINDOW + 2)[1:-1]
+    windows = (windows - windows.mean(axis=1, keepdims=True)) * shape
+    curvature = (2.0 * np.sin(np.pi * np.arange(WINDOW // 2 + 1) / WINDOW)) ** 2
+    lower, upper = (slice(WINDOW // k + 1, 2 * WINDOW // k + 1) for k in (8, 4))
+    power = np.abs(scipy.fft.rfft(windows, axis=1)) ** 2 / (shape @ shape)
+    below, above = (np.mean(power[:, some] / curvature[some] ** 2, axis=1) for some in (lower, upper))
+    falls = float(np.mean(1.0 / curvature[lower]) / np.mean(1.0 / curvature[upper]))
+    white = (falls * above - below) / (falls - 1.0)
+    return float(np.sqrt(max(np.median(white), 0.0)))
 
 
 def interpolated(frequency: Floats, density: Floats) -> Response:

@@ -17,6 +17,7 @@ from rtcomp.diagnosis.fitting.retuned import Numbers, law, retunings
 from rtcomp.diagnosis.fitting.stage_of import in_units, with_effect
 from rtcomp.diagnosis.fitting.unbiased import unbiased
 from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.forces.noise import Noise
 from rtcomp.diagnosis.mismatch.curves import left_over
 from rtcomp.diagnosis.mismatch.locate import locate
 from rtcomp.diagnosis.mismatch.where import Compared, curves, left_seen
@@ -36,6 +37,7 @@ from rtcomp.stage.stage import Stage
 from rtcomp.units import for_axis, prefixed
 
 UNEXPLAINED = ("unexplained",)
+LOUDER = "the readings are {:.1f} times as noisy as the stage states (sensor.noise): taken as they are"
 NOT_BORNE_OUT = "not named, for a stage with it leaves more than one without it"
 
 
@@ -292,6 +294,8 @@ def _verdict(
 
 def _notes(balance: ForceBalance, found: Search) -> list[str]:
     notes = [f"frequencies count by signal to noise, up to {balance.noise.bandwidth:.3g} Hz", *found.dropped]
+    louder = balance.noise.rms / (Noise.stated(balance.stage) or math.inf)
+    notes += [LOUDER.format(louder)] if round(louder, 1) > 1.0 else []
     names = ent.names(found.chosen.entries)
     (low, high), unit = prefixed(for_axis("m", balance.stage.axis), *balance.data.stroke)
     if names:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtcomp.diagnosis.numerics.spectrum import filtered, motion_spectrum, spectrum
+from rtcomp.diagnosis.numerics.spectrum import filtered, motion_spectrum, spectrum, white_noise
 from rtcomp.kernels import Floats
 
 
@@ -42,6 +42,24 @@ def test_a_long_stroke_does_not_leak_into_what_is_noise(stroke: float) -> None:
     noise = 1e-8 * np.random.default_rng(4).standard_normal(moves.size)
     frequency, density = motion_spectrum([stroke * moves / np.ptp(moves) + noise], 1000.0)
     assert np.median(density[frequency > 350.0]) == pytest.approx(1e-16 / 500.0, rel=0.1)
+
+
+@given(stroke=st.floats(1e-6, 1.0), noise=st.floats(1e-9, 1e-6), jumps=st.integers(0, 5))
+@settings(max_examples=25, deadline=None)
+def test_white_noise_is_told_beside_motion_and_jumps(stroke: float, noise: float, jumps: int) -> None:
+    """Of moves up to 1e9 times as large, with jumps of a tenth of the stroke."""
+    random = np.random.default_rng(6)
+    t = np.arange(20_000) / 1000.0
+    moves = 0.5 * stroke * np.sin(2.0 * math.pi * 0.7 * t)
+    jumped = 0.1 * stroke * np.sum(t[:, None] > random.uniform(0.0, 20.0, jumps), axis=1)
+    told = white_noise([moves + jumped + noise * random.standard_normal(t.size)])
+    assert told == pytest.approx(noise, rel=0.15)
+
+
+def test_what_falls_with_frequency_is_no_white_noise() -> None:
+    walk = np.cumsum(np.random.default_rng(7).standard_normal(20_000))
+    assert white_noise([walk]) < 0.25
+    assert white_noise([walk[:200]]) == 0.0
 
 
 def test_noise_at_an_end_is_no_step() -> None:
