@@ -55,7 +55,7 @@ class Noise:
         positions, stated = [s.position for s in data.segments], cls.stated(stage)
         frequency, density = (motion_spectrum if stated > 0.0 else spectrum)(positions, data.rate)
         most = float(np.sqrt(density.min() * 0.5 * data.rate))
-        rms = min(max(stated, white_noise(positions)), most) if stated > 0.0 else most
+        rms = min(max(stated, white_noise(positions), 0.1 * most), most) if stated > 0.0 else most
         floor = rms**2 / (0.5 * data.rate)
         share = np.maximum(1.0 - floor / density, 1e-6)
         signal = interpolated(frequency, share.copy())
