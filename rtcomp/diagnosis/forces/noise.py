@@ -46,7 +46,7 @@ class Noise:
 
     @classmethod
     def of(cls, stage: Stage, data: Data) -> Noise:
-        """Take the noise that the stage states, or what the recording plainly has more; else the recording's.
+        """Take the noise that the stage states; the recording's where that is louder, or none is stated.
 
         Noise that is larger than all there is at some frequency is not there. Where a stage says nothing, all
         that stands in the weakest band, be it leaked from the motion, counts as noise: too much of it says
