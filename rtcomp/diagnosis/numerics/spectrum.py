@@ -17,7 +17,7 @@ PAD = 0.1
 BANDS = 60
 """Bands, equally wide in the logarithm of frequency, over which spectra are smoothed."""
 WINDOW = 256
-"""Rows of the windows that tell white noise: some are without what is rare."""
+"""Rows of the windows that tell white noise: short, so that most have no jump."""
 AT_A_TIME = 4
 """Signals that are transformed together: more do not stay in the processor's cache."""
 OF_A_POINT = 100.0

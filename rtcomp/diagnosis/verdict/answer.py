@@ -22,6 +22,7 @@ from rtcomp.diagnosis.mismatch.curves import left_over
 from rtcomp.diagnosis.mismatch.locate import locate
 from rtcomp.diagnosis.mismatch.where import Compared, curves, left_seen
 from rtcomp.diagnosis.numerics.significance import SURE
+from rtcomp.diagnosis.numerics.spectrum import white_noise
 from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
 from rtcomp.diagnosis.search.confidence import Alternatives
 from rtcomp.diagnosis.search.selection import Search
@@ -294,7 +295,8 @@ def _verdict(
 
 def _notes(balance: ForceBalance, found: Search) -> list[str]:
     notes = [f"frequencies count by signal to noise, up to {balance.noise.bandwidth:.3g} Hz", *found.dropped]
-    louder = balance.noise.rms / (Noise.stated(balance.stage) or math.inf)
+    white = min(white_noise([s.position for s in balance.data.segments]), balance.noise.rms)
+    louder = white / (Noise.stated(balance.stage) or math.inf)
     notes += [LOUDER.format(louder)] if round(louder, 1) > 1.0 else []
     names = ent.names(found.chosen.entries)
     (low, high), unit = prefixed(for_axis("m", balance.stage.axis), *balance.data.stroke)

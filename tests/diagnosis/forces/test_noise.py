@@ -32,9 +32,19 @@ def test_a_replicate_is_as_noisy_as_its_recording() -> None:
     assert jitter[0] == pytest.approx(jitter[1], rel=0.1)
 
 
+SAID = "times as noisy as the stage states"
+
+
 def test_a_sensor_that_is_noisier_than_stated_is_no_missing_physics_and_said() -> None:
     belief = stage()
     axis = belief.with_changes(sensor={"noise": 3.0 * belief.sensor.noise})
     done = diagnose(belief, [run(axis, there_and_back(20.0))])
     assert done.verdict in ("consistent", "retuned")
-    assert any("times as noisy as the stage states" in note for note in done.notes)
+    assert any(SAID in note for note in done.notes)
+
+
+def test_a_jump_of_the_reading_is_no_noise() -> None:
+    plant = stage(effects=[{"name": "sensor-jump", "size": 1e-4, "time": 9.0}])
+    done = diagnose(stage(), [run(plant, there_and_back(20.0))])
+    assert done.effects[0].names == ("sensor-jump",)
+    assert not any(SAID in note for note in done.notes)
