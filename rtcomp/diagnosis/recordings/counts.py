@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 
 SMALL = 10.0
 """Differences of up to so many of the least are looked at: of more, rounding in the file is a part."""
-NEAR = 0.1
-"""How near to a whole number of counts half of the differences are, in counts: by chance one in five is."""
+NEAR = 0.05
+"""How near to whole numbers of counts differences are on average, in counts: by chance, or where half of them
+are odd numbers of a count half as large, that is 0.25."""
 FEW = 20
 """Least number of differences."""
 NO_CHANGE = 1e-12
@@ -43,7 +44,7 @@ def count_of(recordings: Sequence[Recording]) -> float:
     whole = np.round(small / count)
     count = float((small @ whole) / (whole @ whole))
     off = np.abs(small / count - np.round(small / count))
-    return count if small.size >= FEW and np.median(off) < NEAR else 0.0
+    return count if small.size >= FEW and np.mean(off) < NEAR else 0.0
 
 
 def _sound(recording: Recording) -> list[Floats]:
