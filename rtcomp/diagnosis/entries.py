@@ -171,8 +171,11 @@ def shape_parameters(entry: Mapping[str, Any]) -> list[Parameter]:
 
 
 def is_form(kind: type[Effect], p: Parameter) -> bool:
-    """Tell whether a parameter says in which form an effect comes: it has a default and few values."""
-    return p.choice or (p.default is not None and p.name in kind.search_grid)
+    """Tell whether a parameter says in which form an effect comes: it has a default and a few values.
+
+    Of a single value in the grid a fit begins.
+    """
+    return p.choice or (p.default is not None and len(kind.search_grid.get(p.name, ())) > 1)
 
 
 def in_other_forms(entry: Mapping[str, Any]) -> list[Entry]:

@@ -25,8 +25,8 @@ from rtcomp.diagnosis.positions.hidden import MUCH, hides
 from rtcomp.diagnosis.positions.trajectory import Trajectory
 from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.result import Diagnosis, Place
+from rtcomp.diagnosis.search.as_it_is import null_of_belief
 from rtcomp.diagnosis.search.confidence import alternatives
-from rtcomp.diagnosis.search.replicates import null_of_belief
 from rtcomp.diagnosis.search.selection import LOOKED, Search, search
 from rtcomp.diagnosis.search.ways import Left, alike, doubted
 from rtcomp.diagnosis.settings import BUDGET, LEFT, LEVEL

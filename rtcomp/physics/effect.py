@@ -169,7 +169,8 @@ class Effect:
     """Whether a search for missing physics tries it. False for what every stage has or what is identified
     otherwise: friction models, the sensor's noise and resolution, free curves."""
     search_grid: ClassVar[Mapping[str, Sequence[float]]] = {}
-    """Start values of a search for parameters without a unit, which gives others their scale."""
+    """Start values of a search for parameters without a unit, which gives others their scale. Several of one
+    that has a default are all that it may be; from a single one a fit begins."""
     whole_friction: bool = False
     """Whether it asks for the whole of friction (its force or level), so that the friction with it at work is
     no longer a sum of what single friction elements do."""

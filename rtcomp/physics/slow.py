@@ -134,7 +134,7 @@ class StictionAgeing(Effect):
     example = {"growth": 0.1, "distance": 1e-5}
     neutral = {"growth": 0.0}
     linear = ("growth",)
-    search_grid = {"following": (0.0, 1.0)}
+    search_grid = {"onset": (FRESH,), "following": (0.0, 1.0)}
     order = 20
     states = 2
 

@@ -93,7 +93,8 @@ def test_what_a_search_reads_fits_its_parameters(entry):
     if entry.neutral is not None:
         assert set(entry.linear) <= set(entry.neutral) <= set(known)
     for name, values in entry.search_grid.items():
-        assert known[name].unit == "1", "a unit gives the others their scale"
+        scaled = known[name].unit == "1" or list(values) == [known[name].default]
+        assert scaled, "a unit gives the others their scale, or their default does"
         assert len(values) > 0 and list(values) == sorted(values)
         for value in values:
             known[name].check(value, entry.name)

@@ -16,7 +16,7 @@ from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.intervals import told
-from rtcomp.diagnosis.fitting.other_forms import errors_beside, force_of, in_any_form
+from rtcomp.diagnosis.fitting.other_forms import errors_beside, force_of, in_any_form, of_position
 from rtcomp.diagnosis.numerics.significance import Null, log_gain
 from rtcomp.diagnosis.search.confirmed import denied
 from rtcomp.diagnosis.search.free_function import rival
@@ -56,9 +56,16 @@ def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, e
 
 
 def impossible(fitter: Fitter, model: Fitted, parent: Fitted) -> bool:
-    """Tell whether a number of a model is at its bound, or believed mass or friction is displaced by it."""
-    displaces = fitter.by_force and displaces_belief(fitter.balance, model, parent)
-    return model.at_bound or displaces
+    """Tell whether a model is none: a number of it is at its bound, or an effect is not what it says.
+
+    What displaces believed mass or friction is no effect; nor is what remembers, where it is bent to a smooth
+    function of the position: the recording shows nothing of its memory.
+    """
+    if model.at_bound or not fitter.by_force:
+        return model.at_bound
+    remembers = [e for e in model.entries if ent.kind_of(e).states > 0]
+    forgets = any(of_position(fitter.balance, e).size for e in remembers)
+    return forgets or displaces_belief(fitter.balance, model, parent)
 
 
 def _as_believable(fitter: Fitter, model: Fitted, larger: Fitted | None = None) -> Fitted:

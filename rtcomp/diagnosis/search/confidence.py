@@ -59,14 +59,19 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
     """Return the chosen effects, each with its set; stops looking at the time `ends`.
 
     Where a plainer model that is likelier cannot be told from the chosen one, it is chosen from then on. So
-    is one as plain that is better.
+    is one as plain that is better. Where the chosen one leaves more than noise, its forms are wrong and say
+    nothing: all are compared by any law of what their effects go by. What stands in the place of one may else
+    make up for the form of another.
     """
     done: list[Alternatives] = []
     while len(done) < len(found.chosen.terms):
         chosen, i = found.chosen, len(done)
         rest = fitter.fit([*chosen.terms[:i], *chosen.terms[i + 1 :]], chosen)
         models = [chosen, *_others(fitter, found, i, rest, ends)]
-        errors = [_by_cell(fitter, m) for m in models]
+        more = found.null is None or found.null.p_of_error(chosen.errors) < LEVEL
+        errors = [
+            _by_cell(fitter, in_any_form(fitter, m, any_laws(fitter, m)) if more else m) for m in models
+        ]
         errors, rows = above_noise(found, errors, _independent(fitter, chosen) / errors[0].size)
         weight = probabilities(errors, rows, [m.size for m in models])
         alike = set(confidence_set(errors, SET_LEVEL))
@@ -91,7 +96,7 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         plainest = min(models[k].size for k in members)
         enough = max(weight[k] for k in members if models[k].size == plainest)
         members = {k for k in members if models[k].size == plainest or weight[k] > enough} | {0}
-        if _may_be_no_wave(fitter, found, i) or _shows_no_memory(fitter, chosen, i):
+        if _may_be_no_wave(fitter, found, i):
             members |= {k for k, m in enumerate(models) if k and _gain_by_position(fitter, rest, m) >= least}
         order = sorted(members, key=lambda k: (-round(float(weight[k]), DIGITS), k))  # of equals the chosen
         names = [_replaced(models[k], chosen, i) for k in order]
@@ -123,10 +128,7 @@ def _by_cell(fitter: Fitter, model: Fitted) -> Floats:
     """Return the squared error of a model in every cell that is not reserved, (C,).
 
     What acts now and then, as a drive's limit, shows in some of them: of ten blocks it would be by chance.
-    Its effects are compared by any law of what they go by: what stands in the place of one may else make up
-    for the form of another.
     """
-    model = in_any_form(fitter, model, any_laws(fitter, model))
     block = fitter.block
     cell = np.arange(block.size) * (fitter.blocks * CELLS) // block.size
     used = fitter.use[block]
@@ -168,12 +170,6 @@ def _may_be_no_wave(fitter: Fitter, found: Search, at: int) -> bool:
         return False
     more = found.null is not None and found.null.p_of_error(found.chosen.errors) < LEVEL
     return period.high >= high - low or (more and 2.0 * period.value > high - low)
-
-
-def _shows_no_memory(fitter: Fitter, chosen: Fitted, at: int) -> bool:
-    """Tell whether a chosen effect that remembers is bent to a smooth function of the position alone."""
-    entry = chosen.entries[at]
-    return ent.kind_of(entry).states > 0 and of_position(fitter.balance, entry).size > 0
 
 
 def _gain_by_position(fitter: Fitter, rest: Fitted, model: Fitted) -> float:

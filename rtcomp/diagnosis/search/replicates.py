@@ -19,10 +19,9 @@ from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.unbiased import numbers_of
-from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.forces.replicate import left_by
 from rtcomp.diagnosis.numerics.significance import Null, log_gain
-from rtcomp.diagnosis.recordings.data import Data
+from rtcomp.diagnosis.search.as_it_is import no_more_than_its_own
 from rtcomp.diagnosis.search.matched import matched
 from rtcomp.diagnosis.settings import LEVEL, REPLICATES
 from rtcomp.errors import ConfigError
@@ -67,13 +66,22 @@ def null_of(
     `ends` a few replicates must do.
 
     Where the bias of the fit may be why it leaves more than they do, those of a model count that would be
-    fitted as this one is (`matched`).
+    fitted as this one is (`matched`). Where the belief as it is may have made the recording too, its own
+    count if they gain as much: that nothing is missing is denied only if it is by both.
     """
-    null = _of_model(fitter, fitted, fitted, screen, gain, seed, full, ends)
+
+    def of(stage: Callable[[], Stage]) -> Null:
+        return _of_model(fitter, fitted, stage, screen, gain, seed, full, ends)
+
+    null = of(partial(fitter.stage, fitted, between=True))
+    if _may_be_believed(fitter, fitted, null, gain, seed, ends):
+        believed = of(lambda: fitter.balance.stage)
+        if believed.numbers is not None and believed.p_value(gain) > null.p_value(gain):
+            null = replace(believed, numbers=null.numbers)
     if not _may_be_bent(fitter, fitted, null):
         return null
     for true, more in matched(fitter, fitted, 1000 * seed, ends):
-        again = _of_model(fitter, fitted, true, screen, gain, seed, full, ends)
+        again = of(partial(fitter.stage, true, between=True))
         if again.p_of_error(fitted.errors) > null.p_of_error(fitted.errors):
             null = replace(again, numbers=(fitted.whole - more)[None, :])
         if null.p_of_error(fitted.errors) >= LEVEL:
@@ -92,19 +100,29 @@ def _may_be_bent(fitter: Fitter, fitted: Fitted, null: Null) -> bool:
     return null.p_of_error(fitted.errors * min(max(less, 0.0), 1.0) ** 2) >= LEVEL
 
 
+def _may_be_believed(fitter: Fitter, fitted: Fitted, null: Null, gain: float, seed: int, ends: float) -> bool:
+    """Tell whether a gain is more than fits of a fit have, though the belief needs none to leave so little.
+
+    Fits of a belief are bent where a sensor is coarse, and chance gains more beside it than beside the fit.
+    """
+    if fitted.terms or not fitter.by_force or null.p_value(gain) >= LEVEL or clock.now() > ends:
+        return False
+    return no_more_than_its_own(fitter, fitter.balance.stage, seed)
+
+
 def _of_model(
     fitter: Fitter,
     fitted: Fitted,
-    true: Fitted,
+    made_by: Callable[[], Stage],
     screen: Screen,
     gain: float,
     seed: int,
     full: float,
     ends: float,
 ) -> Null:
-    """Return the null distribution beside a fitted model by replicates of a `true` one (`null_of`)."""
+    """Return the null distribution beside a fitted model by replicates of a stage (`null_of`)."""
     try:
-        stage = fitter.stage(true, between=True)
+        stage = made_by()
     except ConfigError:
         return _surrogates(fitter, fitted, screen, seed)
     names = ent.names(fitted.entries)
@@ -187,28 +205,6 @@ def _largest(
             if screened.gain > (0.0 if best[1] is None else best[1].gain):
                 best = own, screened
     return best
-
-
-def null_of_belief(
-    balance: ForceBalance,
-    stage: Stage,
-    left: Callable[[Data], Floats],
-    seed: int,
-    gains: Floats | None = None,
-) -> Null | None:
-    """Return what is `left` of recordings of a believed `stage`, as it is; None where it makes too few.
-
-    `gains` are those of another null distribution, which go on to count.
-    """
-
-    def one(number: int) -> Floats | None:
-        data = left_by(stage, balance, 1000 * seed + number)
-        return None if data is None else left(data)
-
-    errors = [e for e in shared(one, range(FEW)) if e is not None]
-    if len(errors) < FEW // 2:
-        return None
-    return Null(np.zeros(len(errors)) if gains is None else gains, np.array(errors))
 
 
 def _null(fitted: Fitted, found: Sequence[Drawn], chance: Floats) -> Null:

@@ -1,4 +1,4 @@
-"""The belief as it is, not refitted, against recordings of its own."""
+"""The belief as it is, where nothing was found: whether it leaves as much of recordings of its own."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ import numpy as np
 
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.numerics.significance import Null
-from rtcomp.diagnosis.search.replicates import null_of_belief
+from rtcomp.diagnosis.search.as_it_is import left_as_it_is, no_more_than_its_own, null_of_belief, of_unfitted
 from rtcomp.diagnosis.search.selection import Search
-from rtcomp.diagnosis.settings import BELIEF_SD, LEVEL, TOLERANCE
-from rtcomp.kernels import Floats
+from rtcomp.diagnosis.settings import BELIEF_SD, LEVEL
 from rtcomp.stage.stage import Stage
 
 
@@ -20,14 +19,10 @@ def as_loud(fitter: Fitter, believed: Stage, found: Search, seed: int) -> Null |
     fit: a fitted stage that has it rings less, and what its replicates leave is no measure. The
     unfitted belief must also agree with the recording, or have no larger error than on its own replicates.
     """
-    if found.chosen.terms or found.null is None:
+    if found.chosen.terms or found.null is None or not no_more_than_its_own(fitter, believed, seed):
         return None
-    gains, balance, unfitted = found.null.gains, fitter.balance, _left(fitter, believed)
-    if unfitted.sum() > TOLERANCE**2 * np.count_nonzero(fitter.rows):
-        null = null_of_belief(balance, believed, lambda data: _left(fitter.on(data), believed), seed)
-        if null is None or null.p_of_error(unfitted) < LEVEL:
-            return None
-    null = null_of_belief(balance, believed, lambda data: fitter.on(data).fit([]).errors, seed, gains)
+    gains = found.null.gains
+    null = null_of_belief(fitter.balance, believed, lambda data: fitter.on(data).fit([]).errors, seed, gains)
     return null if null is not None and null.as_loud(found.chosen.errors, LEVEL) else None
 
 
@@ -37,13 +32,9 @@ def agrees(fitter: Fitter, believed: Stage, seed: int) -> bool:
     Asked where nothing was found and no number moved. An objective that trusts no row finds nothing, whatever
     is missing; numbers that it cannot tell may still be off as far as they are believed (BELIEF_SD).
     """
-    unfitted, enough = float(_left(fitter, believed).sum()), BELIEF_SD**2 * np.count_nonzero(fitter.rows)
+    unfitted = float(left_as_it_is(fitter, believed).sum())
+    enough = BELIEF_SD**2 * np.count_nonzero(fitter.rows)
     if unfitted <= enough:
         return True
-    own = null_of_belief(fitter.balance, believed, lambda data: _left(fitter.on(data), believed), seed)
+    own = of_unfitted(fitter, believed, seed)
     return bool(own is not None and unfitted - own.noise <= enough)
-
-
-def _left(fitter: Fitter, believed: Stage) -> Floats:
-    """Return the squared relative force error of the belief in each block to fit, (B_use,)."""
-    return np.asarray(np.bincount(fitter.block, fitter.left_by(believed) ** 2, fitter.blocks)[fitter.use])

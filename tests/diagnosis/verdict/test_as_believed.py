@@ -12,7 +12,7 @@ from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.forces.replicate import left_by
 from rtcomp.diagnosis.positions.trajectory import Trajectory
 from rtcomp.diagnosis.recordings.data import load_data
-from rtcomp.diagnosis.search.replicates import null_of_belief
+from rtcomp.diagnosis.search.as_it_is import null_of_belief
 from rtcomp.diagnosis.search.selection import Search
 from rtcomp.diagnosis.settings import LEVEL
 from rtcomp.diagnosis.verdict.as_believed import agrees, as_loud
