@@ -7,6 +7,9 @@ import math
 from rtcomp.kernels import Floats, compiled
 from rtcomp.trial.axis import Physics
 
+FRESH = 0.01
+"""Time at rest (s) from which on contacts age."""
+
 
 @compiled
 def bell(x: float, width: float) -> float:
@@ -104,7 +107,7 @@ def slip_level(p: Physics, t: float, speed: float, rest: float) -> float:
     if p.drift_form != 0.0:
         g += p.drift * grown(t, p.drift_time, p.drift_form)
     if p.ageing != 0.0:
-        g += p.ageing * math.log10(1.0 + rest / 0.01)
+        g += p.ageing * math.log10(1.0 + rest / FRESH)
     return g
 
 

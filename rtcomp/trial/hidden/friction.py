@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
+from rtcomp.trial.forces import FRESH
 from rtcomp.trial.hidden.secret import Rig, Secret, Size, Sized, either, linear, log_between
 
 
@@ -86,9 +88,9 @@ def _ageing(chance: np.random.Generator, rig: Rig) -> Sized:
     distance = rig.physics.reach * log_between(chance, 0.2, 1.0)
 
     def at(strength: float) -> Size:
-        growth = 0.08 * strength
-        changes = {"ageing": growth, "ageing_distance": distance}
-        return changes, {"growth": growth, "distance": distance}
+        by_decade = 0.08 * strength
+        changes = {"ageing": by_decade, "ageing_distance": distance}
+        return changes, {"growth": by_decade / math.log(10.0), "distance": distance, "onset": FRESH}
 
     return Sized(at, most=6.0)
 
@@ -126,7 +128,7 @@ FRICTION = (
     Secret("load-dependent-friction", _load, ("coefficient",)),
     Secret("non-congruent-friction", _softening),
     Secret("frictional-lag", _lagged, ("time_constant",), known=_known_stribeck),
-    Secret("stiction-ageing", _ageing),
+    Secret("stiction-ageing", _ageing, ("growth", "distance", "onset")),
     Secret("friction-drift", _drift, ("change", "time_constant")),
     Secret("creep", _creep),
 )

@@ -45,6 +45,20 @@ def test_an_effect_is_grown_in_the_form_that_it_has(following: float) -> None:
     assert least_left(fitter, [other], blocks, math.inf).weighed == pytest.approx(own.weighed, abs=0.3)
 
 
+@pytest.mark.parametrize("onset", [0.01, 0.2])
+def test_how_long_a_rest_takes_to_matter_is_found_with_ageing(onset: float) -> None:
+    aged = {"name": "stiction-ageing", "growth": 0.2, "distance": 2e-5, "onset": onset, "following": 1.0}
+    balance = ForceBalance(stage(), load_data([run(stage(effects=[aged]), there_and_back(16.0))]))
+    base, fitter = baseline(balance), Fitter(balance)
+    found = look(fitter, base)
+    grown = grow(fitter, base, found.candidates, found.screened, math.inf)
+    best = min(grown, key=lambda model: model.sse).entries[0]
+    assert best["name"] == "stiction-ageing"
+    assert {n: best[n] for n in aged if n != "name"} == pytest.approx(
+        {n: v for n, v in aged.items() if n != "name"}, rel=0.15
+    )
+
+
 @given(st.lists(st.lists(st.floats(1e-3, 9.0), min_size=1, max_size=4), max_size=6))
 def test_of_the_likeliest_starts_that_is_taken_which_leaves_least(errors: list[list[float]]) -> None:
     families = [[Term.of({"name": "drive-lag", "time_constant": e}) for e in family] for family in errors]

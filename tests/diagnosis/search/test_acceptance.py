@@ -15,7 +15,7 @@ from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.forces.balance import ForceBalance
 from rtcomp.diagnosis.numerics.significance import Null
 from rtcomp.diagnosis.recordings.data import load_data
-from rtcomp.diagnosis.search.acceptance import accepted, doubts
+from rtcomp.diagnosis.search.acceptance import accepted, doubts, impossible
 
 STRIBECK = {"name": "stribeck", "rise": 0.4, "velocity": 1e-3}
 BY_LOAD = {"name": "load-dependent-friction", "form": "linear", "stiffening": 1.0}
@@ -107,3 +107,32 @@ def test_what_a_poor_form_of_one_effect_leaves_is_no_room_for_another() -> None:
     null = Null(np.linspace(0.0, 0.01, 19), np.tile(1e-3 * model.errors, (19, 1)))
     of_wave, of_stop = doubts(fitter, model, null)
     assert not of_wave.why and "is left, more than noise" in of_stop.why
+
+
+def test_a_hysteresis_bent_to_a_function_of_the_position_is_none() -> None:
+    """A spring that softens as an exponential: Bouc-Wen's equation without a loop has that very law."""
+    axis = stage()
+    recording = run(axis, there_and_back(20.0))
+    length = float(np.abs(recording.position).max())
+    x = recording.position / length
+    noise = 0.05 * np.random.default_rng(1).standard_normal(x.size)
+    force = 0.5 * np.sign(x) * -np.expm1(-3.0 * np.abs(x)) + noise
+    pushed = {**recording.columns, "voltage": recording.voltage + force}
+    balance = ForceBalance(axis, load_data([replace(recording, columns=pushed)]))
+    base, fitter = baseline(balance), Fitter(balance)
+    bent = {"name": "bouc-wen", "alpha": 6.0 / length, "beta": 30.0 / length, "gamma": 0.0, "delta": 0.1}
+    model = fitter.fit([Term(bent, frozenset({"alpha", "beta"}))], base)
+    assert not model.at_bound and impossible(fitter, model, base)
+    spring = Term.of({"name": "parallel-spring", "stiffness": 1.0 / length, "cubic": 1e3})
+    beside = fitter.fit([*model.terms, spring], model)
+    assert impossible(fitter, beside, model)
+    alone = fitter.fit([spring], base)
+    assert not impossible(fitter, alone, base)
+
+
+def test_a_hysteresis_with_a_loop_is_one() -> None:
+    loop = {"name": "bouc-wen", "alpha": 6e3, "beta": 1e4, "gamma": 0.5, "delta": -0.5}
+    balance = ForceBalance(stage(), load_data([run(stage(effects=[loop]), there_and_back(20.0))]))
+    base, fitter = baseline(balance), Fitter(balance)
+    model = fitter.fit([Term(loop, frozenset({"alpha"}))], base)
+    assert not impossible(fitter, model, base)
