@@ -100,11 +100,9 @@ def test_without_what_is_hidden_the_balance_closes(name: str) -> None:
 
 
 def test_thin_beliefs_are_of_each_sort() -> None:
-    frictions = [
-        len(drawn("thin-belief", seed, "clean").believed["stage"].get("friction", [])) for seed in range(8)
-    ]
-    assert 0 in frictions and 18 in frictions and any(0 < n < 5 for n in frictions)
     thin = [drawn("thin-belief", seed, "clean").believed["stage"] for seed in range(8)]
+    frictions = [len(stage.get("friction", [])) for stage in thin]
+    assert 0 in frictions and 18 in frictions and any(0 < n < 5 for n in frictions)
     least = next(stage for stage in thin if "friction" not in stage)
     assert set(least) == {"mass", "force_constant", "voltage_limit"}
 
