@@ -52,8 +52,9 @@ def other_forms(fitter: Fitter, model: Fitted, at: int) -> Floats:
 def variants(fitter: Fitter, model: Fitted, at: int) -> Floats:
     """Return the columns (q, n) that another form of a model's effect number `at` would add by its own law.
 
-    Of a wave its overtones; of a force by the position, by the time of the run or by the force of friction
-    another law of that; of what makes friction larger the same cause, which makes it so more or less.
+    Of a wave its overtones; of a force by the position that no number bends, of what goes by the time of the
+    run or by the force of friction another law of that; of what makes friction larger the same cause, which
+    makes it so more or less.
     """
     courses = _by_its_own(fitter, model, at)
     return np.concatenate([overtones(fitter, model, model.entries[at]), *courses])
@@ -150,7 +151,7 @@ def other_beliefs(balance: ForceBalance, model: Fitted, besides: str) -> Floats:
 def _by_its_own(fitter: Fitter, model: Fitted, at: int) -> Iterator[Floats]:
     """Go through the columns (q, n) of another law of what a model's effect number `at` goes by."""
     balance, kind = fitter.balance, ent.kind_of(model.entries[at])
-    if not kind.known_law:
+    if not (kind.known_law or ent.shape_parameters(model.entries[at])):
         yield of_position(balance, model.entries[at])
     if ent.goes_by_time(kind):
         yield _bent_along(fitter, model, at, balance.plain([s.time for s in balance.data.segments]))

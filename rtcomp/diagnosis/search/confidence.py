@@ -13,13 +13,14 @@ from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.candidates.effects import started
 from rtcomp.diagnosis.candidates.growing import fitted_in_time
 from rtcomp.diagnosis.candidates.screening import look
+from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
-from rtcomp.diagnosis.fitting.intervals import told
 from rtcomp.diagnosis.fitting.other_forms import any_laws, errors_beside, in_any_form, of_position
 from rtcomp.diagnosis.numerics.significance import confidence_set, log_gain, probabilities
 from rtcomp.diagnosis.search.acceptance import impossible
+from rtcomp.diagnosis.search.by_position import bent, goes_plainly, may_be_no_wave
 from rtcomp.diagnosis.search.replicates import best
 from rtcomp.diagnosis.search.selection import Search
 from rtcomp.diagnosis.search.separate import separate
@@ -80,8 +81,9 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         members |= _not_separate(fitter, found, models, set(range(len(models))) - members, ends)
         besides = {k for k in members if k and explains_another(fitter, chosen, rest, models[k], ends)}
         members -= besides
-        if 0 in alike:
-            plainer = min(members, key=lambda k: (models[k].size, -weight[k]))
+        claims = {k for k in range(1, len(models)) if _claims_more(fitter, chosen.entries[i], models[k])}
+        if 0 in alike or claims:
+            plainer = min(members - claims, key=lambda k: (models[k].size, -weight[k]))
             instead = plainer if models[plainer].size < chosen.size and weight[plainer] > weight[0] else 0
         else:
             as_plain = [k for k, m in enumerate(models) if m.size <= chosen.size]
@@ -96,9 +98,10 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         plainest = min(models[k].size for k in members)
         enough = max(weight[k] for k in members if models[k].size == plainest)
         members = {k for k in members if models[k].size == plainest or weight[k] > enough} | {0}
-        if _may_be_no_wave(fitter, found, i):
+        if may_be_no_wave(fitter, chosen, i, found.null):
             members |= {k for k, m in enumerate(models) if k and _gain_by_position(fitter, rest, m) >= least}
-        order = sorted(members, key=lambda k: (-round(float(weight[k]), DIGITS), k))  # of equals the chosen
+        # Of equals the chosen comes first, and what claims more than it is last.
+        order = sorted(members, key=lambda k: (k in claims, -round(float(weight[k]), DIGITS), k))
         names = [_replaced(models[k], chosen, i) for k in order]
         kept = [j for j, n in enumerate(names) if n not in names[:j]]
         gain = 1.0 - float(chosen.errors.sum() / rest.errors.sum())
@@ -158,18 +161,9 @@ def explains_another(fitter: Fitter, chosen: Fitted, rest: Fitted, other: Fitted
     )
 
 
-def _may_be_no_wave(fitter: Fitter, found: Search, at: int) -> bool:
-    """Tell whether a chosen wave over the stroke may be another function of the position.
-
-    The interval of its period holds the stroke; or it does not repeat within that, and leaves more than
-    noise: neither its repeating nor its form shows it.
-    """
-    low, high = fitter.balance.data.stroke
-    period = told(fitter, found.chosen)[at].values.get(ent.PERIOD)
-    if period is None or not fitter.by_force:
-        return False
-    more = found.null is not None and found.null.p_of_error(found.chosen.errors) < LEVEL
-    return period.high >= high - low or (more and 2.0 * period.value > high - low)
+def _claims_more(fitter: Fitter, entry: Entry, model: Fitted) -> bool:
+    """Tell whether the last effect of a model is bent to a function of the position, of which this is any."""
+    return fitter.by_force and goes_plainly(fitter, entry) and bent(fitter, model.entries[-1])
 
 
 def _gain_by_position(fitter: Fitter, rest: Fitted, model: Fitted) -> float:

@@ -29,6 +29,7 @@ from rtcomp.diagnosis.search.beam import (
     shown_by_more_than_fitting,
     with_two,
 )
+from rtcomp.diagnosis.search.by_position import by_plain_laws
 from rtcomp.diagnosis.search.replicates import best, null_of
 from rtcomp.diagnosis.settings import BEAM, LEAST_GAIN, LEVEL, MOST_EFFECTS
 
@@ -193,7 +194,14 @@ def _offset_judged(fitter: Fitter, found: Search) -> None:
 
 
 def _solid(fitter: Fitter, found: Search) -> None:
-    """Leave out effects that are no finding, the most doubtful first, and refit the others."""
+    """Leave out effects that are no finding, the most doubtful first, and refit the others.
+
+    What is shown to be a smooth function of the position, and no more, is asked by the plainest name for it.
+    """
+    plainly = by_plain_laws(fitter, found.chosen, found.null)
+    if plainly is not found.chosen:
+        found.alternatives, found.beside = [*found.alternatives, found.chosen], None
+        found.chosen = plainly
     while found.chosen.terms:
         doubted = doubts(fitter, found.chosen, found.null)
         weak = [i for i, doubt in enumerate(doubted) if doubt.why]
