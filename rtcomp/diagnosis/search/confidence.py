@@ -75,18 +75,19 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         ]
         errors, rows = above_noise(found, errors, _independent(fitter, chosen) / errors[0].size)
         weight = probabilities(errors, rows, [m.size for m in models])
-        alike = set(confidence_set(errors, SET_LEVEL))
+        claims = {k for k in range(1, len(models)) if _claims_more(fitter, chosen.entries[i], models[k])}
+        plain = [k for k in range(len(models)) if k not in claims]
+        alike = {plain[j] for j in confidence_set([errors[k] for k in plain], SET_LEVEL)}
         least = (1.0 - ALIAS) * log_gain(rest.errors, chosen.errors)
         members = alike | {0} | {k for k, m in enumerate(models) if log_gain(rest.errors, m.errors) >= least}
         members |= _not_separate(fitter, found, models, set(range(len(models))) - members, ends)
         besides = {k for k in members if k and explains_another(fitter, chosen, rest, models[k], ends)}
         members -= besides
-        claims = {k for k in range(1, len(models)) if _claims_more(fitter, chosen.entries[i], models[k])}
-        if 0 in alike or claims:
+        if 0 in alike:
             plainer = min(members - claims, key=lambda k: (models[k].size, -weight[k]))
             instead = plainer if models[plainer].size < chosen.size and weight[plainer] > weight[0] else 0
         else:
-            as_plain = [k for k, m in enumerate(models) if m.size <= chosen.size]
+            as_plain = [k for k in plain if models[k].size <= chosen.size]
             instead = min(as_plain, key=lambda k: float(np.log(errors[k]).sum()))
         if instead:
             found.alternatives = [m for m in found.alternatives if m is not models[instead]] + [chosen]
