@@ -46,8 +46,8 @@ class Alternatives:
 
     term: Term
     names: tuple[str, ...]
-    """All that cannot be told apart, likeliest first, what has more parameters after what has less: if it is
-    no likelier by them, it is no other explanation."""
+    """All that cannot be told apart, likeliest first, but the chosen one before what is no better. What has
+    more parameters and is no likelier by them is no other explanation."""
     probability: float
     """That the truth is among them, if it is among all that was fitted."""
     gain: float
@@ -101,8 +101,7 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         members = {k for k in members if models[k].size == plainest or weight[k] > enough} | {0}
         if may_be_no_wave(fitter, chosen, i, found.null):
             members |= {k for k, m in enumerate(models) if k and _gain_by_position(fitter, rest, m) >= least}
-        # Of equals the chosen comes first; what claims more than it, or needs more numbers, after it.
-        later = claims | {k for k in members if models[k].size > chosen.size and 0 in alike}
+        later = claims | ({k for k in members if k} if 0 in alike else set())  # it is in the stage given
         order = sorted(members, key=lambda k: (k in later, -round(float(weight[k]), DIGITS), k))
         names = [_replaced(models[k], chosen, i) for k in order]
         kept = [j for j, n in enumerate(names) if n not in names[:j]]

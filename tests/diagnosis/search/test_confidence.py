@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 from recorded import run, stage, there_and_back
@@ -33,3 +34,19 @@ def test_of_two_as_plain_the_better_is_chosen(name: str, most: float) -> None:
     sets = alternatives(fitter, found, math.inf)
     assert [one.names[0] for one in sets] == ["drive-saturation", name]
     assert sets[1].probability > 0.95
+
+
+PUSHES: list[dict[str, Any]] = [
+    {"name": "constant-force", "force": 0.6},
+    {"name": "drive-offset", "offset": 0.15},
+]
+
+
+@pytest.mark.parametrize("first", PUSHES)
+def test_of_two_that_do_the_same_the_one_in_the_stage_comes_first(first: dict[str, Any]) -> None:
+    """The parameters that are told are of that one."""
+    balance = ForceBalance(stage(), load_data([run(stage(effects=PUSHES[:1]), there_and_back(12.0))]))
+    base, fitter = baseline(balance), Fitter(balance)
+    chosen, other = (fitter.fit([Term.of(e)], base) for e in sorted(PUSHES, key=lambda e: e is not first))
+    (told,) = alternatives(fitter, Search(base, chosen, alternatives=[other]), math.inf)
+    assert told.names == (first["name"], other.entries[0]["name"])
