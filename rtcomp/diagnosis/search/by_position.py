@@ -1,12 +1,11 @@
-"""A force that is shown to go smoothly by the position, and no more: the plainest name for it comes first.
+"""A force that is shown to go smoothly by the position, and no more: the plainest name for it.
 
 A wave that was not seen to repeat and a stop in the middle of the stroke are smooth functions of the position
-there. A spring by any law is every such function: it claims nothing that was not seen.
+there. Where they leave more than noise, their form does not show them either. A spring by any law is every
+such function: it claims nothing that was not seen.
 """
 
 from __future__ import annotations
-
-import math
 
 from rtcomp.diagnosis import entries as ent
 from rtcomp.diagnosis.candidates.effects import searchable
@@ -14,18 +13,21 @@ from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
-from rtcomp.diagnosis.fitting.intervals import told
 from rtcomp.diagnosis.fitting.other_forms import errors_beside, of_position
 from rtcomp.diagnosis.numerics.significance import Null, log_gain
 from rtcomp.diagnosis.search.acceptance import impossible
-from rtcomp.diagnosis.settings import LEFT, LEVEL
+from rtcomp.diagnosis.settings import LEVEL
 
 
 def by_plain_laws(fitter: Fitter, chosen: Fitted, null: Null | None) -> Fitted:
-    """Return a model with a plain law of the position in the place of what may only be bent to it."""
+    """Return a model with a plain law of the position in the place of what may only be bent to it.
+
+    Unless the model leaves no more than noise: then its forms are right.
+    """
+    if null is None or null.p_of_error(chosen.errors) >= LEVEL:
+        return chosen
     for i in range(len(chosen.terms)):
-        unsure = _more(chosen, null) or may_be_no_wave(fitter, chosen, i, null)
-        if unsure and bent(fitter, chosen.entries[i]):
+        if bent(fitter, chosen.entries[i]):
             chosen = min(_plain(fitter, chosen, i), key=lambda m: m.sse, default=chosen)
     return chosen
 
@@ -42,32 +44,14 @@ def goes_plainly(fitter: Fitter, entry: Entry) -> bool:
     return not ent.shape_parameters(entry) and of_position(fitter.balance, entry).size > 0
 
 
-def may_be_no_wave(fitter: Fitter, model: Fitted, at: int, null: Null | None) -> bool:
-    """Tell whether a wave over the stroke, a model's effect number `at`, may be another function of it.
-
-    The interval of its period holds the stroke; or it does not repeat within that, and leaves more than
-    noise: neither its repeating nor its form shows it.
-    """
-    low, high = fitter.balance.data.stroke
-    period = told(fitter, model)[at].values.get(ent.PERIOD)
-    if period is None or not fitter.by_force:
-        return False
-    return period.high >= high - low or (_more(model, null) and 2.0 * period.value > high - low)
-
-
-def _more(model: Fitted, null: Null | None) -> bool:
-    return null is not None and null.p_of_error(model.errors) < LEVEL
-
-
 def _plain(fitter: Fitter, chosen: Fitted, at: int) -> list[Fitted]:
     """Return models with a law that no number bends in the place of effect number `at`.
 
-    Those that in any form explain as much, or all but what another form may leave.
+    Those that in any form explain as much.
     """
     found = []
     others = [t for i, t in enumerate(chosen.terms) if i != at]
     rest = fitter.fit(others, chosen)
-    enough = min(log_gain(rest.errors, chosen.errors), -math.log(LEFT))
     for kind in searchable(fitter.balance):
         entry: Entry = {"name": kind.name, **dict.fromkeys(kind.linear, 1.0)}
         plain = fitter.linear(kind) and all(p.name in entry for p in kind.parameters)
@@ -75,6 +59,6 @@ def _plain(fitter: Fitter, chosen: Fitted, at: int) -> list[Fitted]:
             continue
         model = fitter.fit([*others[:at], Term.of(entry), *others[at:]], chosen)
         errors = errors_beside(fitter, model, fitter.variants(model, at))
-        if not impossible(fitter, model, rest) and log_gain(rest.errors, errors) >= enough:
+        if not impossible(fitter, model, rest) and log_gain(chosen.errors, errors) >= 0.0:
             found.append(model)
     return found

@@ -17,14 +17,15 @@ from rtcomp.diagnosis.entries import Entry
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.fitted import Fitted
 from rtcomp.diagnosis.fitting.free import Term
+from rtcomp.diagnosis.fitting.intervals import told
 from rtcomp.diagnosis.fitting.other_forms import any_laws, errors_beside, in_any_form, of_position
 from rtcomp.diagnosis.numerics.significance import confidence_set, log_gain, probabilities
 from rtcomp.diagnosis.search.acceptance import impossible
-from rtcomp.diagnosis.search.by_position import bent, goes_plainly, may_be_no_wave
+from rtcomp.diagnosis.search.by_position import bent, goes_plainly
 from rtcomp.diagnosis.search.replicates import best
 from rtcomp.diagnosis.search.selection import Search
 from rtcomp.diagnosis.search.separate import separate
-from rtcomp.diagnosis.settings import ALIAS, LEVEL
+from rtcomp.diagnosis.settings import ALIAS, LEFT, LEVEL
 from rtcomp.kernels import Floats
 
 SET_LEVEL = 0.05
@@ -99,8 +100,9 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         plainest = min(models[k].size for k in members)
         enough = max(weight[k] for k in members if models[k].size == plainest)
         members = {k for k in members if models[k].size == plainest or weight[k] > enough} | {0}
-        if may_be_no_wave(fitter, chosen, i, found.null):
-            members |= {k for k, m in enumerate(models) if k and _gain_by_position(fitter, rest, m) >= least}
+        if _may_be_no_wave(fitter, chosen, i, more=more):
+            enough = min(least, -math.log(LEFT)) if more else least
+            members |= {k for k, m in enumerate(models) if k and _gain_by_position(fitter, rest, m) >= enough}
         later = claims | ({k for k in members if k} if 0 in alike else set())  # it is in the stage given
         order = sorted(members, key=lambda k: (k in later, -round(float(weight[k]), DIGITS), k))
         names = [_replaced(models[k], chosen, i) for k in order]
@@ -160,6 +162,19 @@ def explains_another(fitter: Fitter, chosen: Fitted, rest: Fitted, other: Fitted
         log_gain(chosen.errors, both.errors) > ANOTHER * log_gain(rest.errors, other.errors)
         for both in fitted_in_time(fitter, chosen, other.terms[-1:], ends)
     )
+
+
+def _may_be_no_wave(fitter: Fitter, chosen: Fitted, at: int, *, more: bool) -> bool:
+    """Tell whether a chosen wave over the stroke may be another function of the position.
+
+    The interval of its period holds the stroke; or it does not repeat within that, and leaves `more` than
+    noise: neither its repeating nor its form shows it.
+    """
+    low, high = fitter.balance.data.stroke
+    period = told(fitter, chosen)[at].values.get(ent.PERIOD)
+    if period is None or not fitter.by_force:
+        return False
+    return period.high >= high - low or (more and 2.0 * period.value > high - low)
 
 
 def _claims_more(fitter: Fitter, entry: Entry, model: Fitted) -> bool:
