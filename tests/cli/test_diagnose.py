@@ -151,7 +151,7 @@ def test_names_of_columns_and_notes_of_reading_arrive_in_the_answer(folder: Path
     shutil.copy(folder / "stage.yaml", tmp_path)
     run = rtcomp(
         "diagnose", "log.csv", "--stage", "stage.yaml", "--out", "out", "--json", "--map", "time=t",
-        "--map", "position=qm", "--map", "voltage=vir", "--budget", "15", at=tmp_path, timeout=600,
+        "--map", "position=qm", "--map", "voltage=vir", at=tmp_path, timeout=600,
     )  # fmt: skip
     assert (run.returncode, run.stderr) == (0, "")
     answer = json.loads(run.stdout)
