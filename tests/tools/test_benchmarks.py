@@ -114,7 +114,7 @@ def test_a_diagnosis_without_recordings_to_judge(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_every_pair_of_stage_and_recording_ends_in_an_answer_or_a_line(tmp_path: Path) -> None:
-    found = figures(tmp_path, "bench_answers.py", "--pairs", 8, "--seed", 7, "--jobs", 2)
+    found = figures(tmp_path, "bench_answers.py", "--pairs", 6, "--seed", 7, "--jobs", 2)
     assert found["neither"]["value"] == 0.0
 
 

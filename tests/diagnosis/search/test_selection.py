@@ -69,9 +69,9 @@ def test_an_effect_that_compensates_for_another_is_fitted_again_beside_it() -> N
 
 def test_a_large_event_and_what_it_hides_are_found_together() -> None:
     """Alone neither explains much of most blocks: the reading jumps once; the lag shows beside it only."""
-    jump, lag = {"size": 6e-5, "time": 9.0}, {"time_constant": 4e-3}
+    jump, lag = {"size": 6e-5, "time": 5.0}, {"time_constant": 4e-3}
     there = [{"name": "sensor-jump", **jump}, {"name": "drive-lag", **lag}]
-    balance = ForceBalance(stage(), load_data([run(stage(effects=there), there_and_back(20.0))]))
+    balance = ForceBalance(stage(), load_data([run(stage(effects=there), there_and_back(12.0))]))
     base, fitter = baseline(balance), Fitter(balance)
     found = search(fitter, base, math.inf, lambda _part, _what: None)
     assert sorted(term.entry["name"] for term in found.chosen.terms) == ["drive-lag", "sensor-jump"]
