@@ -25,13 +25,12 @@ from rtcomp.diagnosis.positions.hidden import MUCH, hides
 from rtcomp.diagnosis.positions.trajectory import Trajectory
 from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.result import Diagnosis, Place
-from rtcomp.diagnosis.search.as_it_is import null_of_belief
+from rtcomp.diagnosis.search.as_believed import as_loud, null_of_belief
 from rtcomp.diagnosis.search.confidence import alternatives
 from rtcomp.diagnosis.search.selection import LOOKED, Search, search
 from rtcomp.diagnosis.search.ways import Left, alike, doubted
 from rtcomp.diagnosis.settings import BUDGET, LEFT, LEVEL
 from rtcomp.diagnosis.verdict.answer import Rest, answer
-from rtcomp.diagnosis.verdict.as_believed import as_loud
 from rtcomp.diagnosis.verdict.validation import Reserved
 from rtcomp.errors import RtcompError
 from rtcomp.recording.reader import Recording
@@ -122,7 +121,11 @@ def _diagnosed(
     more = Rest.of(fitter, found).significant
     if hidden and (found.denied or more):
         fitter, found = _by_position(stage, fitter, found, finish, say, seed)
-    if fitter.by_force and more and (of_belief := as_loud(fitter, stage, found, seed)) is not None:
+    if (
+        fitter.by_force
+        and more
+        and (of_belief := as_loud(fitter, stage, found.chosen, found.null, seed)) is not None
+    ):
         found.null, found.as_believed = of_belief, True
     say(0.0, "tell apart")
     sets = alternatives(fitter, found, ends - (1.0 - TELL_APART) * budget)

@@ -8,7 +8,7 @@ from rtcomp.kernels import Floats, compiled
 from rtcomp.trial.axis import Physics
 
 FRESH = 0.01
-"""Time at rest (s) from which on contacts age."""
+"""Time at rest (s) after which friction begins to grow."""
 
 
 @compiled

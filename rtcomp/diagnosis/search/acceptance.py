@@ -58,8 +58,8 @@ def accepted(fitter: Fitter, model: Fitted, parent: Fitted, null: Null | None, e
 def impossible(fitter: Fitter, model: Fitted, parent: Fitted) -> bool:
     """Tell whether a model is none: a number of it is at its bound, or an effect is not what it says.
 
-    What displaces believed mass or friction is no effect; nor is what remembers, where it is bent to a smooth
-    function of the position: the recording shows nothing of its memory.
+    An effect that takes the place of believed mass or friction is none. An effect with memory, such as a
+    hysteresis, is none where its fit is a smooth function of the position: the recording shows no memory.
     """
     if model.at_bound or not fitter.by_force:
         return model.at_bound

@@ -21,7 +21,7 @@ from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.fitting.unbiased import numbers_of
 from rtcomp.diagnosis.forces.replicate import left_by
 from rtcomp.diagnosis.numerics.significance import Null, log_gain
-from rtcomp.diagnosis.search.as_it_is import no_more_than_its_own
+from rtcomp.diagnosis.search.as_believed import no_more_than_its_own
 from rtcomp.diagnosis.search.matched import matched
 from rtcomp.diagnosis.settings import LEVEL, REPLICATES
 from rtcomp.errors import ConfigError

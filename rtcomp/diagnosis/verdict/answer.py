@@ -24,10 +24,10 @@ from rtcomp.diagnosis.mismatch.where import Compared, curves, left_seen
 from rtcomp.diagnosis.numerics.significance import SURE
 from rtcomp.diagnosis.numerics.spectrum import white_noise
 from rtcomp.diagnosis.result import Candidate, Diagnosis, Experiment, Fit, Named, Retuned, Value, Verdict
+from rtcomp.diagnosis.search.as_believed import agrees
 from rtcomp.diagnosis.search.confidence import Alternatives
 from rtcomp.diagnosis.search.selection import Search
 from rtcomp.diagnosis.settings import LEAST_GAIN, LEFT, LEVEL, TOLERANCE
-from rtcomp.diagnosis.verdict.as_believed import agrees
 from rtcomp.diagnosis.verdict.detectability import sights
 from rtcomp.diagnosis.verdict.experiment import next_experiment
 from rtcomp.diagnosis.verdict.one_cause import LENGTH, Cause, fixed_units, force_constant, one_cause
