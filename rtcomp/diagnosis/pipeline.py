@@ -121,11 +121,8 @@ def _diagnosed(
     more = Rest.of(fitter, found).significant
     if hidden and (found.denied or more):
         fitter, found = _by_position(stage, fitter, found, finish, say, seed)
-    if (
-        fitter.by_force
-        and more
-        and (of_belief := as_loud(fitter, stage, found.chosen, found.null, seed)) is not None
-    ):
+    of_belief = as_loud(fitter, stage, found.chosen, found.null, seed) if fitter.by_force and more else None
+    if of_belief is not None:
         found.null, found.as_believed = of_belief, True
     say(0.0, "tell apart")
     sets = alternatives(fitter, found, ends - (1.0 - TELL_APART) * budget)

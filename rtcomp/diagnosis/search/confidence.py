@@ -103,7 +103,7 @@ def alternatives(fitter: Fitter, found: Search, ends: float) -> list[Alternative
         if _may_be_no_wave(fitter, chosen, i, more=more):
             enough = min(least, -math.log(LEFT)) if more else least
             members |= {k for k, m in enumerate(models) if k and _gain_by_position(fitter, rest, m) >= enough}
-        later = claims | ({k for k in members if k} if 0 in alike else set())  # the stage has 0
+        later = claims | ({k for k in members if k} if 0 in alike else set())  # 0 is in the stage
         order = sorted(members, key=lambda k: (k in later, -round(float(weight[k]), DIGITS), k))
         names = [_replaced(models[k], chosen, i) for k in order]
         kept = [j for j, n in enumerate(names) if n not in names[:j]]
