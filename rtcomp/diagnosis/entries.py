@@ -249,6 +249,13 @@ def sizes_of(entry: Mapping[str, Any]) -> Floats:
     return np.array(found)
 
 
+def wave_of(entry: Mapping[str, Any]) -> slice | None:
+    """Return where among the sizes of the `basis` the two of a wave stand; None where there is no wave."""
+    sized = _sized(entry)
+    found = (slice(at, at + len(quarters)) for at, (_, quarters) in enumerate(sized) if quarters)
+    return next(found, None)
+
+
 def units_of(entry: Mapping[str, Any]) -> list[str]:
     """Return the unit of each of these sizes."""
     kind = kind_of(entry)

@@ -16,8 +16,12 @@ from rtcomp.diagnosis.forces.balance import BASE
 from rtcomp.diagnosis.numerics.spread import BALANCE, MODEL, elsewhere, scatter
 from rtcomp.diagnosis.result import Retuned, Value
 from rtcomp.kernels import Floats
+from rtcomp.physics import Parameter
 from rtcomp.stage.stage import Stage
 from rtcomp.units import for_axis
+
+AROUND = 360
+"""Points along the edge of what two sizes may be."""
 
 
 @dataclass(frozen=True)
@@ -38,45 +42,105 @@ def told(fitter: Fitter, fitted: Fitted) -> list[Told]:
     Methodology 28(2)); what a single block tells is compared with the rest of the recording. What replicates
     are off by was taken off, and is known to no more than its own size.
     """
-    from scipy.special import stdtrit
-
     balance = fitter.balance
     spans = fitted.system.of_entry[len(balance.believed) :]
-    factor = float(stdtrit(max(fitted.without.shape[0] - 1, 1), 0.975))
     axis = balance.stage.axis
     found = []
     held = _shapes_held(fitter, fitted)
     for i, (term, span) in enumerate(zip(fitted.terms, spans, strict=True)):
         kind = ent.kind_of(term.entry)
         without, once = _values(fitted, i, span, fitted.without), _once(fitter, fitted, i, span)
-        alone, off = _values(held, i, span, held.without), _off(fitted, i, span)
-        values, neutral = {}, []
+        off, around = _off(fitted, i, span), _around(fitted, i, span)
+        factor = _factor(fitted.without)
+        values = {}
         bound = [f.name for f in fitted.free if f.term == i and f.at_bound(fitted.terms)]
         for p in kind.parameters:
             if p.name not in term.entry:
                 continue
             value = float(term.entry[p.name])
-            half = 0.0
+            down = up = 0.0
             if p.name in without:
-                apart = without[p.name] - value
-                if p.unit == ent.PHASE:
-                    apart = (apart + np.pi) % (2.0 * np.pi) - np.pi
-                sd = _deviation(apart)
                 size = 2.0 if p.unit == ent.PHASE else abs(value)
-                spread = factor * max(sd, once.get(p.name, 0.0))
-                half = math.hypot(spread, off.get(p.name, 0.0), MODEL * size)
+                spread = factor * _deviation(_apart(p, without[p.name], value))
+                least, more = factor * once.get(p.name, 0.0), math.hypot(off.get(p.name, 0.0), MODEL * size)
+                ends = around.get(p.name, (spread, spread))
+                down, up = (math.hypot(max(end, least), more) for end in ends)
                 if p.name not in bound and _at_bound(value, p.lowest, ent.highest(term.entry, p)):
                     bound.append(p.name)
             elif p.name == ent.MOMENT:
-                half = balance.data.period
-            low, high = max(value - half, p.low), min(value + half, ent.highest(term.entry, p))
+                down = up = balance.data.period
+            low, high = max(value - down, p.low), min(value + up, ent.highest(term.entry, p))
             values[p.name] = Value(value, low, high, for_axis(p.unit, axis))
-            if p.name in kind.linear and p.name in without:
-                spread = max(_deviation(alone[p.name] - value), once.get(p.name, 0.0))
-                half = math.hypot(factor * spread, MODEL * abs(value))
-                neutral.append(abs(value - ent.neutral(kind, p.name)) <= half)
-        found.append(Told(values, bool(neutral) and all(neutral), tuple(bound)))
+        found.append(Told(values, _nothing(held, i, span, once), tuple(bound)))
     return found
+
+
+def _factor(without: Floats, sizes: int = 1) -> float:
+    """Return the standard deviations that hold 95 % of `sizes` found `without` each block, (B, q)."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(max(without.shape[0] - sizes, 1), 0.975))
+
+
+def _apart(p: Parameter, values: Floats, value: float) -> Floats:
+    """Return how far `values` of a parameter are from one `value`, a phase the shorter way round."""
+    apart = values - value
+    return (apart + np.pi) % (2.0 * np.pi) - np.pi if p.unit == ent.PHASE else apart
+
+
+def _around(fitted: Fitted, at: int, span: slice) -> dict[str, tuple[float, float]]:
+    """Return how far down and up amplitude and phase of a wave may be, whose two sizes are fitted.
+
+    They bend: along a short arc of a wave one size may be open and the other sure, and then the amplitude
+    cannot be nothing, though it may be many times its value. So they are read along the edge of what the
+    sizes may be.
+    """
+    term = fitted.terms[at]
+    wave = ent.wave_of(term.entry)
+    if wave is None or span.stop == span.start:
+        return {}
+    sizes, without = fitted.coefficients[span], fitted.without[:, span]
+    lengths, axes = np.linalg.eigh(scatter(without[:, wave]))
+    angles = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
+    circle = np.sqrt(np.maximum(lengths, 0.0))[:, None] * np.array([np.cos(angles), np.sin(angles)])
+    edge = np.tile(sizes, (AROUND, 1))
+    edge[:, wave] += _factor(without, 2) * (axes @ circle).T
+    if np.sum((axes.T @ sizes[wave]) ** 2 / np.maximum(lengths, 1e-300)) <= _factor(without, 2) ** 2:
+        edge[0, wave] = 0.0  # within the edge
+    made = [ent.composed(term.entry, one) for one in edge]
+    found = {}
+    for p in ent.kind_of(term.entry).parameters:
+        if p.name in made[0] and (p.unit == ent.PHASE or p.name == ent.AMPLITUDE):
+            apart = _apart(p, np.array([one[p.name] for one in made]), float(term.entry[p.name]))
+            found[p.name] = float(max(-apart.min(), 0.0)), float(max(apart.max(), 0.0))
+    return found
+
+
+def _nothing(held: Fitted, at: int, span: slice, once: dict[str, float]) -> bool:
+    """Tell whether all sizes of a term may be neutral at once; its shape is `held`.
+
+    What they are together counts: of two that blocks tell only as their sum, neither alone is sure.
+    """
+    entry = held.terms[at].entry
+    kind = ent.kind_of(entry)
+    names = [n for n in kind.linear if n in entry]
+    if span.stop > span.start:
+        apart, without = held.coefficients[span], held.without[:, span]
+        alone = np.full(apart.size, max((once.get(n, 0.0) for n in names), default=0.0))
+    else:
+        found = _values(held, at, span, held.without)
+        names = [n for n in names if n in found]
+        if not names:
+            return False
+        apart = np.array([float(entry[n]) - ent.neutral(kind, n) for n in names])
+        without = np.stack([found[n] for n in names], axis=1)
+        alone = np.array([once.get(n, 0.0) for n in names])
+    factor, spread = _factor(without, apart.size), scatter(without)
+    least = np.maximum(alone**2 - np.diag(spread), 0.0) + (MODEL * apart / factor) ** 2
+    spread = spread + np.diag(least)
+    scale = np.sqrt(np.diag(spread)) + 1e-300
+    away = apart / scale
+    return bool(away @ np.linalg.pinv(spread / np.outer(scale, scale), hermitian=True) @ away <= factor**2)
 
 
 def _deviation(without: Floats) -> float:
@@ -152,10 +216,7 @@ def _once(fitter: Fitter, fitted: Fitted, at: int, span: slice) -> dict[str, flo
 
 def believed_sizes(fitter: Fitter, fitted: Fitted) -> list[Retuned]:
     """Return the sizes of believed effects that moved, each by more than its 95 % interval."""
-    from scipy.special import stdtrit
-
-    axis = fitter.balance.stage.axis
-    factor = float(stdtrit(max(fitted.without.shape[0] - 1, 1), 0.975))
+    axis, factor = fitter.balance.stage.axis, _factor(fitted.without)
     now = fitter.believed_as(fitted, fitted.coefficients)
     others = [fitter.believed_as(fitted, c) for c in fitted.without]
     found = []
@@ -176,12 +237,10 @@ def numbers(fitter: Fitter, believed: Stage, fitted: Fitted, *, effects: bool = 
 
     With `effects`, the sizes of forces that believed effects add as well, by amount.
     """
-    from scipy.special import stdtrit
-
     # Where a fast run is in one block only, the others still tell mass and damping, though less well.
     values, sets, sizes = fitter.numbers(_left_out(fitter, fitted, len(BASE)), effects=effects)
     spread = np.maximum(np.diag(scatter(sets)), 0.0)
-    factor = float(stdtrit(max(sets.shape[0] - 1, 1), 0.975))
+    factor = _factor(sets)
     off = _numbers_off(fitter, fitted, values, effects=effects)
     half = np.sqrt(factor**2 * spread + (MODEL * values) ** 2 + off**2)
     m = believed.mechanics

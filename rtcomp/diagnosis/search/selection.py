@@ -327,14 +327,17 @@ def sound(seen: Look, model: Fitted, parent: float, before: Search) -> Look | No
     A model that explains recordings of its own no better than the one before explains the real recording has
     shown nothing: it put the drive's force on both sides of the balance. Nor has one that is further than
     that from what its own recordings leave: a lag with hardly any mass makes noise less, not the mismatch.
+    Noise of a reading goes by the mass squared; what else is less beside a model is not noise.
     """
     if seen.null is None or seen.null.noise > parent:
         return seen if seen.null is None else None
-    null, last = seen.null, before.null
+    null, last, smaller = seen.null, before.null, before.chosen
     if last is None or last.numbers is None or null.numbers is None or null.p_of_error(model.errors) >= LEVEL:
         return seen
-    further = model.errors.sum() / null.noise > before.chosen.errors.sum() / last.noise
-    return None if further and len(model.terms) > len(before.chosen.terms) else seen
+    lighter = min(float(model.coefficients[0] / smaller.coefficients[0]), 1.0)
+    noise = max(null.noise, last.noise * lighter**2)
+    further = model.errors.sum() / noise > smaller.errors.sum() / last.noise
+    return None if further and len(model.terms) > len(smaller.terms) else seen
 
 
 def _table(

@@ -82,3 +82,37 @@ def test_what_replicates_are_off_by_is_part_of_an_interval() -> None:
     mass = {str(i): numbers(fitter, believed, one) for i, one in enumerate((model, exact, bent))}
     sizes = [found.half[0] / found.values[0] for found in mass.values()]
     assert sizes[1] < sizes[0] and sizes[2] == pytest.approx(0.05, rel=0.15)
+
+
+@pytest.mark.parametrize(("amplitude", "nothing"), [(0.4, False), (0.0, True)])
+def test_a_weight_on_a_short_arc_is_something_though_its_amplitude_is_open(
+    amplitude: float, nothing: bool
+) -> None:
+    """Its sine is that of a spring, which blocks cannot part from the believed one; its cosine is sure."""
+    spring = {"name": "parallel-spring", "stiffness": 30.0}
+    axis = {"axis": "rotary", "mass": 0.3, "viscous": 0.1, "micro_damping": 0.0, "effects": [spring]}
+    weight = {"name": "gravity", "amplitude": amplitude, "phase": 2.2}
+    hidden = stage(**{**axis, "effects": [spring, weight]})
+    balance = ForceBalance(stage(**axis), load_data([run(hidden, 1000.0 * there_and_back(12.0))]))
+    baseline(balance)
+    fitter = Fitter(balance)
+    found = told(fitter, fitter.fit([Term.of({**weight, "amplitude": 0.3, "phase": 1.0})]))[0]
+    size, angle = found.values["amplitude"], found.values["phase"]
+    assert found.nothing is nothing
+    if nothing:
+        assert size.low <= 0.0
+    else:
+        assert 0.9 * amplitude * abs(np.cos(2.2)) < size.low < amplitude < size.high
+        assert angle.low < 2.2 < angle.high
+
+
+def test_the_interval_of_a_wave_is_that_of_its_sizes_where_both_are_sure() -> None:
+    """Along a small ellipse amplitude and phase go by it to first order: as far down as up."""
+    wave = {"name": "cogging", "amplitude": 0.5, "period": 2e-4, "phase": 0.7}
+    balance = ForceBalance(stage(), load_data([run(stage(effects=[wave]), there_and_back(12.0))]))
+    baseline(balance)
+    fitter = Fitter(balance)
+    found = told(fitter, fitter.fit([Term.of(wave)]))[0]
+    size, angle = found.values["amplitude"], found.values["phase"]
+    assert size.low < 0.5 < size.high < 0.55 and angle.low < 0.7 < angle.high < 0.8
+    assert size.high - size.value == pytest.approx(size.value - size.low, rel=0.1)
