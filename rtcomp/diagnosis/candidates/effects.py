@@ -253,7 +253,7 @@ def _candidate(
             term = Term(entry, free | {linear})
             low, high = np.full(2, -most / step), np.full(2, most / step)
         else:
-            parts = [{**entry, linear: step}]
+            parts = [{**entry, linear: entry[linear] + step}]
             dead = {p.name for p in kind.parameters if p.unit == ent.PHASE or p.name == ent.PERIOD}
             own = {p.name for p in kind.parameters if p.name in entry}
             others = set(kind.linear) if phases or not ent.adds_force(kind) else set()

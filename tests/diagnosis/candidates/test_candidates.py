@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from recorded import RATE, run, stage, there_and_back
 
-from rtcomp.diagnosis.candidates.effects import candidates
+from rtcomp.diagnosis.candidates.effects import candidates, started
 from rtcomp.diagnosis.candidates.scales import Scales
 from rtcomp.diagnosis.candidates.screening import look
 from rtcomp.diagnosis.fitting.baseline import baseline
@@ -128,3 +128,16 @@ def test_waves_are_looked_for_in_what_the_fit_leaves_of_all_blocks_but_the_reser
     balance = ForceBalance(air(), load_data([run(air({**TONE, "frequency": 7.3}), reference)]))
     base, fitter = baseline(balance), Fitter(balance)
     np.testing.assert_array_equal(Scales.of(fitter, base).residual[1], base.residual * fitter.rows)
+
+
+def test_a_fit_begins_near_a_scale_though_its_neutral_value_is_one() -> None:
+    """A weight repeats with the turn: its law tells the unit of the angle, which all other numbers follow."""
+    weight = {"name": "gravity", "amplitude": 8.0, "phase": 0.3}
+    axis = {"axis": "rotary", "mass": 0.3, "viscous": 0.1, "micro_damping": 0.0}
+    hidden = stage(**axis, effects=[weight, {"name": "sensor-scale", "scale": 1.06}])
+    data = load_data([run(hidden, 1000.0 * there_and_back(12.0))])
+    balance = ForceBalance(stage(**axis, effects=[weight]), data)
+    base, fitter = baseline(balance), Fitter(balance)
+    seen = look(fitter, base)
+    begun = {c.name: started(c, s.sizes).entry for c, s in zip(seen.candidates, seen.screened, strict=True)}
+    assert begun["sensor-scale"]["scale"] == pytest.approx(1.06, abs=0.02)
