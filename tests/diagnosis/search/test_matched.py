@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from joints import MASS, joint, swings
 from recorded import run
@@ -13,6 +14,7 @@ from rtcomp.diagnosis.fitting.baseline import baseline
 from rtcomp.diagnosis.fitting.fit import Fitter
 from rtcomp.diagnosis.fitting.free import Term
 from rtcomp.diagnosis.forces.balance import ForceBalance
+from rtcomp.diagnosis.numerics.significance import Null
 from rtcomp.diagnosis.pipeline import diagnose
 from rtcomp.diagnosis.recordings.data import load_data
 from rtcomp.diagnosis.search.acceptance import accepted
@@ -21,6 +23,7 @@ from rtcomp.diagnosis.search.matched import matched
 from rtcomp.diagnosis.search.replicates import null_of
 from rtcomp.diagnosis.search.selection import Search, sound
 from rtcomp.diagnosis.settings import LEVEL
+from rtcomp.kernels import Floats
 
 
 def test_the_mass_that_a_coarse_encoder_hides_is_found_by_fits_of_replicates() -> None:
@@ -69,6 +72,23 @@ def test_a_lag_with_hardly_any_mass_is_further_from_its_own_recordings() -> None
     step = Search(base, base, before)
     assert sound(Look([], [], nothing, own), lag, math.inf, step) is None
     assert sound(Look([], [], nothing, before), base, math.inf, Search(base, base)) is not None
+
+
+def test_what_is_quieter_beside_a_model_of_the_same_mass_was_not_noise() -> None:
+    """Replicates of a belief may be loud by what is missing in it, which the true model is not to pay for."""
+    dead = {"name": "drive-deadband", "width": 0.09}
+    balance = ForceBalance(joint(1e-4), load_data([run(joint(1e-4, MASS, dead), swings())]))
+    base, fitter = baseline(balance), Fitter(balance)
+    true = fitter.fit([Term.of(dead)], base)
+    assert true.coefficients[0] > 0.8 * base.coefficients[0]
+    scatter = np.linspace(0.9, 1.1, 6)[:, None]
+
+    def null(errors: Floats, number: float) -> Null:
+        return Null(np.zeros(6), scatter * errors, np.full((6, 1), number))
+
+    loud, quiet = null(0.5 * base.errors, base.coefficients[0]), null(0.01 * true.errors, MASS)
+    seen = Look([], [], Screen([], fitter), quiet)
+    assert sound(seen, true, math.inf, Search(base, base, loud)) is seen
 
 
 @pytest.mark.slow
