@@ -180,8 +180,8 @@ def test_what_could_not_be_seen_is_said(recorded: Columns, folder: Path) -> None
     assert run.returncode == 0, run.stderr
     answer = json.loads((folder / "out" / "diagnosis.json").read_text())
     seen = {size["name"]: size for size in answer["smallest_seen"]}
-    assert "sensor-scale" in answer["not_observable"] and not set(seen) & set(answer["not_observable"])
+    assert "back-emf" in answer["not_observable"] and not set(seen) & set(answer["not_observable"])
     assert seen["cogging"]["parameter"] == "amplitude" and 0.0 < seen["cogging"]["value"] < 0.5
     text = " ".join(run.stdout.split())
-    assert "in this motion:" in text and "sensor-scale" in text and "cogging amplitude" in text
+    assert "in this motion:" in text and "back-emf" in text and "cogging amplitude" in text
     assert "What could not be seen in this recording" in (folder / "out" / "report.html").read_text()
