@@ -46,12 +46,11 @@ def told(fitter: Fitter, fitted: Fitted) -> list[Told]:
     spans = fitted.system.of_entry[len(balance.believed) :]
     axis = balance.stage.axis
     found = []
-    held = _shapes_held(fitter, fitted)
+    held, factor = _shapes_held(fitter, fitted), _factor(fitted.without)
     for i, (term, span) in enumerate(zip(fitted.terms, spans, strict=True)):
         kind = ent.kind_of(term.entry)
         without, once = _values(fitted, i, span, fitted.without), _once(fitter, fitted, i, span)
         off, around = _off(fitted, i, span), _around(fitted, i, span)
-        factor = _factor(fitted.without)
         values = {}
         bound = [f.name for f in fitted.free if f.term == i and f.at_bound(fitted.terms)]
         for p in kind.parameters:
